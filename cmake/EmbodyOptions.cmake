@@ -1,0 +1,28 @@
+# Compiler settings shared by every target.
+option(EMBODY_TESTS "Build tests and benchmarks" ON)
+option(EMBODY_WERROR "Treat warnings as errors" OFF)
+option(EMBODY_FUZZ "Build the libFuzzer harnesses (clang)" OFF)
+set(EMBODY_SANITIZE "" CACHE STRING "Sanitizers for -fsanitize=, e.g. address,undefined or thread")
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+# Release keeps symbols: a field report without a backtrace helps nobody.
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -g1 -DNDEBUG")
+set(CMAKE_C_FLAGS_RELEASE "-O2 -g1 -DNDEBUG")
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+if(EMBODY_SANITIZE)
+  add_compile_options(-fsanitize=${EMBODY_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${EMBODY_SANITIZE})
+  add_compile_definitions(EMBODY_SANITIZED=1)
+endif()
+
+add_library(embody_warnings INTERFACE)
+target_compile_options(embody_warnings INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
+  $<$<BOOL:${EMBODY_WERROR}>:-Werror>)

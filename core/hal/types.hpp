@@ -1,0 +1,159 @@
+#pragma once
+// The plain values that travel along the data path. Fixed capacity, default member initialisers, SI units.
+// Default-constructed means "nothing known": not visible, not valid, time "never".
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "core/base/fixed_string.hpp"
+#include "core/base/time.hpp"
+#include "core/math/pose.hpp"
+
+namespace embody {
+
+using math::Pose;
+using math::Vector6;
+
+inline constexpr std::size_t kMaxMarkers = 64;
+inline constexpr std::size_t kMaxHandJoints = 32;
+inline constexpr std::size_t kFingers = 5;
+inline constexpr std::size_t kFingerAngles = 9;  ///< three joints of three axis-angle components
+inline constexpr std::size_t kHandAngles = 45;
+
+/// Index into every per-finger array.
+enum class Finger : std::uint8_t { kThumb, kIndex, kMiddle, kRing, kLittle };
+inline constexpr std::array<const char*, kFingers> kFingerNames{"thumb", "index", "middle", "ring", "little"};
+
+/// First element of each finger in MANO's 45 finger angles (order index, middle, little, ring, thumb).
+inline constexpr std::array<std::size_t, kFingers> kFingerOffset{36, 0, 9, 27, 18};
+
+struct Marker {
+  Eigen::Vector3d p_W{0.0, 0.0, 0.0};  ///< m; meaningless unless visible
+  bool visible{false};
+};
+
+/// One measurement of the tracker. `markers[i]` is the i-th name of the configured glove layout, whatever the sensor's
+/// order.
+struct MarkerFrame {
+  std::uint64_t frame_number{0};  ///< the sensor's own count; may restart
+  std::uint32_t label_epoch{0};   ///< changes when the sensor's label list changed
+  TimePoint t_capture{};          ///< exposure, mapped to CLOCK_MONOTONIC
+  TimePoint t_arrival{};          ///< bytes read from the kernel
+  std::size_t count{0};
+  std::array<Marker, kMaxMarkers> markers{};
+};
+
+/// Pose of the hand in the motion-capture world: the cheap half of the record mapping.
+struct HandPose {
+  std::uint64_t sequence{0};  ///< counts estimates since start, without gaps
+  std::uint64_t frame_number{0};
+  TimePoint t_capture{};
+  TimePoint t_arrival{};
+  TimePoint t_decoded{};        ///< frame decoded
+  TimePoint t_estimated{};      ///< pose computed
+  Pose X_WH{Pose::Identity()};  ///< frame of the three markers on the back of the hand
+  Pose X_WM{Pose::Identity()};  ///< base of the hand model
+  bool valid{false};            ///< false: the poses are the last valid ones
+};
+
+enum class FingerQuality : std::uint8_t {
+  kNone,     ///< no estimate yet
+  kOptimal,  ///< converged on this frame's markers
+  kCapped,   ///< iteration cap reached; best point so far
+  kHeld,     ///< no marker of this finger visible; angles of an earlier frame
+};
+
+/// State of the human hand in MANO's parametrisation.
+struct HandState {
+  std::uint64_t frame_number{0};
+  TimePoint t_capture{};
+  TimePoint t_arrival{};
+  TimePoint t_estimated{};
+  Pose X_WM{Pose::Identity()};
+  Eigen::Matrix<double, static_cast<int>(kHandAngles), 1> q_rad{
+      Eigen::Matrix<double, static_cast<int>(kHandAngles), 1>::Zero()};  ///< axis-angle, MANO's order
+  /// Model points that correspond to the markers, in M (m): [finger][0] tip, [finger][1] middle.
+  std::array<std::array<Eigen::Vector3d, 2>, kFingers> p_M{};
+  std::array<double, kFingers> residual_m{};  ///< mean distance of visible markers to their model points
+  std::array<std::uint8_t, kFingers> visible_markers{};
+  std::array<FingerQuality, kFingers> quality{};
+  bool valid{false};
+};
+
+/// Robot finger angles in the order of the hand driver's joint names.
+struct FingerTarget {
+  std::uint64_t frame_number{0};
+  TimePoint t_capture{};
+  TimePoint t_arrival{};
+  TimePoint t_solved{};
+  std::size_t joint_count{0};
+  std::array<double, kMaxHandJoints> q_rad{};
+  std::array<double, kFingers> residual_m{};  ///< root mean square distance of the finger's point pairs
+  bool valid{false};
+};
+
+enum class ArmCondition : std::uint8_t {
+  kUnknown,
+  kReady,           ///< may move
+  kNotRunning,      ///< not powered, brakes on, booting
+  kProgramStopped,  ///< robot fine, control program not running
+  kProtectiveStop,
+  kEmergencyStop,
+  kFault,
+};
+
+/// What the arm's controller said in one package.
+struct ArmState {
+  std::uint64_t package{0};  ///< counts packages of this session
+  Duration controller_time{0};
+  TimePoint t_arrival{};
+  Vector6 q_rad{Vector6::Zero()};
+  Vector6 qd_rad_s{Vector6::Zero()};
+  Vector6 q_target_rad{Vector6::Zero()};  ///< the controller's own set-point
+  ArmCondition condition{ArmCondition::kUnknown};
+  bool tracking{false};            ///< the robot's control program follows our targets
+  std::int32_t program_fault{0};   ///< reason code of the control program, 0 = none
+  std::uint32_t echo_sequence{0};  ///< newest command sequence the program has seen
+  std::int32_t robot_mode{0};      ///< vendor codes, for display
+  std::int32_t safety_status{0};
+  double speed_scaling{1.0};
+};
+
+enum class ArmAction : std::uint8_t {
+  kHold,   ///< disarm: stand still, ignore targets
+  kTrack,  ///< follow q, qd
+  kExit,   ///< end the control program
+};
+
+struct ArmCommand {
+  std::uint32_t sequence{0};
+  ArmAction action{ArmAction::kHold};
+  Vector6 q_rad{Vector6::Zero()};
+  Vector6 qd_rad_s{Vector6::Zero()};
+  TimePoint t_capture{};  ///< of the measurement that this command answers
+  TimePoint t_expires{};  ///< a driver refuses the command after this
+};
+
+struct HandDeviceState {
+  std::uint64_t reply{0};  ///< counts position replies of this session
+  TimePoint t_arrival{};
+  std::size_t joint_count{0};
+  std::array<double, kMaxHandJoints> q_rad{};
+};
+
+enum class HandAction : std::uint8_t {
+  kHold,  ///< send nothing that moves; poll the positions
+  kMove,
+  kStop,  ///< stop all motors now
+};
+
+struct HandCommand {
+  std::uint32_t sequence{0};
+  HandAction action{HandAction::kHold};
+  std::size_t joint_count{0};
+  std::array<double, kMaxHandJoints> q_rad{};
+  TimePoint t_capture{};
+  TimePoint t_expires{};
+};
+
+}  // namespace embody
