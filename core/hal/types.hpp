@@ -54,6 +54,7 @@ struct HandPose {
   Pose X_WH{Pose::Identity()};  ///< frame of the three markers on the back of the hand
   Pose X_WM{Pose::Identity()};  ///< base of the hand model
   bool valid{false};            ///< false: the poses are the last valid ones
+  std::uint32_t streak{0};      ///< valid, plausible poses in a row up to this one, without a gap in time
 };
 
 enum class FingerQuality : std::uint8_t {

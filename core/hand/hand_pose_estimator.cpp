@@ -1,0 +1,49 @@
+#include "core/hand/hand_pose_estimator.hpp"
+
+namespace embody::hand {
+
+bool hand_frame(const Eigen::Vector3d& p_W_top, const Eigen::Vector3d& p_W_left, const Eigen::Vector3d& p_W_right,
+                Pose& X_WH) noexcept {
+  // Below these the directions are noise: real triads have edges of centimetres.
+  constexpr double kShortestEdge_m = 1e-3;
+  constexpr double kSmallestSine = 0.02;
+  const Eigen::Vector3d approach = p_W_top - p_W_right;
+  const Eigen::Vector3d side = p_W_left - p_W_right;
+  const double approach_m = approach.norm();
+  const double side_m = side.norm();
+  const Eigen::Vector3d normal = approach.cross(side);
+  const double normal_m2 = normal.norm();
+  // Written so that a NaN or an overflow fails the test.
+  if (!(approach_m > kShortestEdge_m && side_m > kShortestEdge_m)) return false;
+  if (!(normal_m2 > kSmallestSine * approach_m * side_m && std::isfinite(normal_m2))) return false;
+  const Eigen::Vector3d z = approach / approach_m;
+  const Eigen::Vector3d y = normal / normal_m2;
+  X_WH.linear().col(0) = y.cross(z);
+  X_WH.linear().col(1) = y;
+  X_WH.linear().col(2) = z;
+  X_WH.translation() = p_W_right;
+  return true;
+}
+
+HandPoseEstimator::HandPoseEstimator(const GloveLayout& glove, const Pose& X_HM) noexcept
+    : back_slots_(glove.back_slots), X_HM_(X_HM) {}
+
+HandPose HandPoseEstimator::step(const MarkerFrame& frame) noexcept {
+  ++last_.sequence;
+  last_.frame_number = frame.frame_number;
+  last_.t_capture = frame.t_capture;
+  last_.t_arrival = frame.t_arrival;
+  last_.valid = false;
+  std::array<Eigen::Vector3d, 3> p_W;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t slot = back_slots_[i];
+    if (slot >= frame.count || slot >= kMaxMarkers || !frame.markers[slot].visible) return last_;
+    p_W[i] = frame.markers[slot].p_W;
+  }
+  if (!hand_frame(p_W[0], p_W[1], p_W[2], last_.X_WH)) return last_;
+  last_.X_WM = last_.X_WH * X_HM_;
+  last_.valid = true;
+  return last_;
+}
+
+}  // namespace embody::hand

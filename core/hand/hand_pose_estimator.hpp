@@ -1,0 +1,30 @@
+#pragma once
+// Pose of the human hand from the three markers on its back: the cheap half of the record mapping.
+#include "core/hal/types.hpp"
+#include "core/hand/glove_layout.hpp"
+
+namespace embody::hand {
+
+/// Marker frame H by the two-vector construction (Fabisch et al. 2022, section "Record Mapping"; Corke 2017):
+/// z from the right to the top marker, y normal to the marker plane, origin in the right marker.
+/// Returns false and leaves `X_WH` alone when the points are not finite or do not span a plane.
+[[nodiscard]] bool hand_frame(const Eigen::Vector3d& p_W_top, const Eigen::Vector3d& p_W_left,
+                              const Eigen::Vector3d& p_W_right, Pose& X_WH) noexcept;
+
+/// Steps once per marker frame, in the order of the frames.
+class HandPoseEstimator {
+ public:
+  /// `X_HM`: base of the hand model in the marker frame, a calibration of glove and subject.
+  HandPoseEstimator(const GloveLayout& glove, const Pose& X_HM) noexcept;
+
+  /// X_WM = X_WH * X_HM. When a marker of the triad is missing or the triad is degenerate, the pose is not valid and
+  /// keeps its last value. About 0.1 us, no heap. t_decoded and t_estimated are the caller's: core reads no clock.
+  [[nodiscard]] HandPose step(const MarkerFrame& frame) noexcept;
+
+ private:
+  std::array<std::size_t, 3> back_slots_;
+  Pose X_HM_;
+  HandPose last_;
+};
+
+}  // namespace embody::hand

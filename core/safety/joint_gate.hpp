@@ -1,0 +1,44 @@
+#pragma once
+// The last word on arm joint motion: speed and acceleration of every joint stay inside their limits, whatever is asked.
+#include "core/hal/types.hpp"
+
+namespace embody::safety {
+
+struct JointLimits {
+  Vector6 speed_rad_s{Vector6::Constant(1.0)};
+  Vector6 acceleration_rad_s2{Vector6::Constant(4.0)};
+  Vector6 lower_rad{Vector6::Constant(-6.28318530717958648)};
+  Vector6 upper_rad{Vector6::Constant(6.28318530717958648)};
+};
+
+/// A set-point that follows a target with feed-forward. It can always brake before the target: the wanted closing speed
+/// is at most sqrt(a |d|), half of the available deceleration a, the rest is left for the feed-forward; near the target
+/// it is kGain |d|, which does not chatter.
+class JointGate {
+ public:
+  explicit JointGate(const JointLimits& limits) noexcept : limits_(limits) {}
+
+  /// Starts from rest at `q_rad`.
+  void reset(const Vector6& q_rad) noexcept;
+  /// One tick of `dt` towards `q_d` moving with `qd_d`. Non-finite targets brake. Targets beyond the joint limits are
+  /// clamped to them. Cost: six square roots.
+  void follow(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s) noexcept;
+  /// One tick of braking with the full deceleration.
+  void brake(double dt_s) noexcept;
+
+  [[nodiscard]] const Vector6& q_rad() const noexcept { return q_rad_; }
+  [[nodiscard]] const Vector6& qd_rad_s() const noexcept { return qd_rad_s_; }
+  [[nodiscard]] bool at_rest() const noexcept { return qd_rad_s_.isZero(0.0); }
+  [[nodiscard]] const JointLimits& limits() const noexcept { return limits_; }
+
+ private:
+  static constexpr double kGain = 30.0;  // 1/s
+
+  void move_with(int joint, double wanted_rad_s, double dt_s) noexcept;
+
+  JointLimits limits_;
+  Vector6 q_rad_{Vector6::Zero()};
+  Vector6 qd_rad_s_{Vector6::Zero()};
+};
+
+}  // namespace embody::safety

@@ -1,0 +1,54 @@
+#pragma once
+// Which hand poses may move a robot.
+#include "core/hal/types.hpp"
+
+namespace embody::teleop {
+
+/// Marks poses that no hand can have reached since the last one as not valid, and counts good poses in a row. A sudden
+/// but lasting change (a new measurement, markers re-identified) is accepted once `kAcceptAfter` poses agree on it; the
+/// streak then starts anew, so whoever waits for a streak waits again.
+class PoseMonitor {
+ public:
+  void step(HandPose& pose) noexcept {
+    if (!pose.valid) {
+      streak_ = 0;
+    } else if (!started_ || plausible(pose, last_)) {
+      const bool gap = !started_ || pose.t_capture - last_.t_capture > kGap;
+      streak_ = gap ? 1 : streak_ + 1;
+      last_ = pose;
+      started_ = true;
+      suspects_ = 0;
+    } else {
+      suspects_ = suspects_ > 0 && plausible(pose, suspect_) ? suspects_ + 1 : 1;
+      suspect_ = pose;
+      streak_ = 0;
+      pose.valid = false;
+      if (suspects_ >= kAcceptAfter) started_ = false;
+    }
+    pose.streak = streak_;
+  }
+
+ private:
+  // Peak wrist speed of fast reaching is about 3 m/s, of fast turning about 15 rad/s; the rest is measurement noise.
+  static constexpr double kSpeed_m_s = 5.0;
+  static constexpr double kSpeed_rad_s = 30.0;
+  static constexpr double kNoise_m = 0.01;
+  static constexpr double kNoise_rad = 0.1;
+  static constexpr std::uint32_t kAcceptAfter = 5;
+  static constexpr Duration kGap = std::chrono::milliseconds(50);
+
+  [[nodiscard]] static bool plausible(const HandPose& pose, const HandPose& before) noexcept {
+    const double dt_s = std::max(0.0, to_seconds(pose.t_capture - before.t_capture));
+    const double distance = (pose.X_WM.translation() - before.X_WM.translation()).norm();
+    const double angle = math::angle_between(before.X_WM.linear(), pose.X_WM.linear());
+    return distance <= kNoise_m + kSpeed_m_s * dt_s && angle <= kNoise_rad + kSpeed_rad_s * dt_s;
+  }
+
+  HandPose last_;
+  HandPose suspect_;
+  bool started_{false};
+  std::uint32_t suspects_{0};
+  std::uint32_t streak_{0};
+};
+
+}  // namespace embody::teleop

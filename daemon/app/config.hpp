@@ -1,0 +1,426 @@
+#pragma once
+// The configuration of the daemon: plain structs with defaults, each visited by parser, printer and documentation
+// (config_field.hpp). The keys are documented in docs/config.md, which is generated from this file.
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/hal/types.hpp"
+#include "daemon/app/config_embodiment.hpp"
+#include "daemon/app/config_field.hpp"
+
+namespace embody::config {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr int kSchema = 1;  ///< raised when a key changes its meaning or disappears
+
+struct TrackerConfig {
+  std::string driver{"qualisys"};
+  std::string host{"127.0.0.1"};
+  int port{22223};
+  bool allow_playback{false};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("driver", driver, "Which driver reads the hand tracker.");
+    v.field("host", host, "Name or address of the tracking computer.");
+    v.field("port", port, Range{1, 65535}, "TCP port; 22223 is the little-endian real-time port of QTM.");
+    v.field("allow_playback", allow_playback,
+            "Accept a recording that the tracking computer plays back. Off: a robot follows live measurements only.");
+  }
+};
+
+enum class FingerPoint : std::uint8_t { kTip, kMiddle };
+inline constexpr std::array<const char*, 2> kFingerPointNames{"tip", "middle"};
+
+/// One marker on a finger: which point of the hand model it shows.
+struct FingerMarkerConfig {
+  std::string marker;
+  Finger finger{Finger::kThumb};
+  FingerPoint point{FingerPoint::kTip};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("marker", marker, "Name of the marker, one of `names`.");
+    v.choice("finger", finger, kFingerNames, "Finger that carries it.");
+    v.choice("point", point, kFingerPointNames, "Finger tip, or the marker near the middle joint.");
+  }
+};
+
+/// The three markers on the back of the hand that span frame H (docs/notation.md).
+struct BackMarkersConfig {
+  std::string top{"hand_top"};
+  std::string left{"hand_left"};
+  std::string right{"hand_right"};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("top", top, "Marker towards the fingers.");
+    v.field("left", left, "Left marker, seen from behind with the fingers up.");
+    v.field("right", right, "Right marker: the origin of frame H.");
+  }
+};
+
+/// Marker glove. The default is the 13-marker glove of the paper.
+struct GloveConfig {
+  std::vector<std::string> names{"hand_top",    "hand_left",    "hand_right",   "thumb_tip",     "thumb_middle",
+                                 "index_tip",   "index_middle", "middle_tip",   "middle_middle", "ring_tip",
+                                 "ring_middle", "little_tip",   "little_middle"};
+  std::vector<FingerMarkerConfig> finger_markers{
+      {"thumb_tip", Finger::kThumb, FingerPoint::kTip},   {"thumb_middle", Finger::kThumb, FingerPoint::kMiddle},
+      {"index_tip", Finger::kIndex, FingerPoint::kTip},   {"index_middle", Finger::kIndex, FingerPoint::kMiddle},
+      {"middle_tip", Finger::kMiddle, FingerPoint::kTip}, {"middle_middle", Finger::kMiddle, FingerPoint::kMiddle},
+      {"ring_tip", Finger::kRing, FingerPoint::kTip},     {"ring_middle", Finger::kRing, FingerPoint::kMiddle},
+      {"little_tip", Finger::kLittle, FingerPoint::kTip}, {"little_middle", Finger::kLittle, FingerPoint::kMiddle}};
+  BackMarkersConfig back;
+
+  template <class V>
+  void visit(V& v) {
+    v.file_key("", "Glove file with the keys of this table (`gloves/*.toml`).");
+    v.field("names", names, "All markers as the tracker labels them; the order is that of the slots of a frame.");
+    v.list("finger_markers", finger_markers, "Markers on the fingers: at most one per finger and point.");
+    v.section("back", back, "The three markers on the back of the hand.");
+  }
+  [[nodiscard]] std::string problem() const;
+};
+
+enum class Skeleton : std::uint8_t { kA, kB };
+inline constexpr std::array<const char*, 2> kSkeletonNames{"A", "B"};
+
+/// The person: size of the hand, and where the back markers sit on it.
+struct SubjectConfig {
+  std::array<double, 6> X_HM_exponential{0.1795496537,  1.6513870904,  -0.1843735310,
+                                         -0.0658988406, -0.0238788252, 0.0873064542};
+  std::array<double, 10> shape{};
+  Skeleton skeleton{Skeleton::kA};
+
+  template <class V>
+  void visit(V& v) {
+    v.file_key("", "Subject file with the keys of this table (`subjects/*.toml`).");
+    v.field("X_HM_exponential", X_HM_exponential, Range{-10, 10},
+            "Pose of the hand model M in the hand-marker frame H as exponential coordinates: three of rotation (rad), "
+            "three of translation (m).");
+    v.field("shape", shape, Range{-0.5, 2},
+            "Relative changes of the hand's size, 0.05 = 5 % more: scale, palm breadth, palm length, length of thumb, "
+            "index, middle, ring and little finger, girth, length of the last phalanges.");
+    v.choice("skeleton", skeleton, kSkeletonNames,
+             "Built-in hand skeleton: A from mean bone lengths, B from the WebXR generic hand.");
+  }
+};
+
+struct RecordMappingConfig {
+  double lower_rad{-0.4 * kPi};
+  double upper_rad{0.4 * kPi};
+  int max_iterations{30};
+  milliseconds slow_down{0};
+  bool slow_down_spins{false};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("lower_rad", lower_rad, Range{-kPi, 0}, "Lower bound of each of the 45 finger angles of the hand model.");
+    v.field("upper_rad", upper_rad, Range{0, kPi}, "Upper bound of each of the 45 finger angles of the hand model.");
+    v.field("max_iterations", max_iterations, Range{1, 1000},
+            "Iterations per finger and frame before the best "
+            "point so far is taken.");
+    v.field("slow_down_ms", slow_down, Range{0, 10000},
+            "Diagnosis: extra time per frame in the finger thread, to show that the arm does not depend on it.");
+    v.field("slow_down_spins", slow_down_spins, "Diagnosis: spend that time computing (true) or waiting (false).");
+  }
+};
+
+/// Where things stand in the robot cell.
+struct CellConfig {
+  std::array<double, 3> p_WB_m{0.7, 0.2, 0.0};
+  std::array<double, 3> r_WB_rad{0.0, 0.0, 0.0};
+  std::array<double, 3> p_EP_m{0.0, 0.0, 0.05};
+  std::array<double, 3> r_EP_rad{kPi / 2, 0.0, 0.0};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("p_WB_m", p_WB_m, Range{-100, 100}, "Arm base B in the motion-capture world W: position.");
+    v.field("r_WB_rad", r_WB_rad, Range{-2 * kPi, 2 * kPi},
+            "Arm base B in the motion-capture world W: rotation vector (axis times angle).");
+    v.field("p_EP_m", p_EP_m, Range{-1, 1}, "Robot hand P in the arm's flange E: position.");
+    v.field("r_EP_rad", r_EP_rad, Range{-2 * kPi, 2 * kPi},
+            "Robot hand P in the arm's flange E: rotation vector. The default turns y_P to z_E and z_P to -y_E.");
+  }
+};
+
+/// What no command to the arm exceeds, whatever the operator's hand does.
+struct ArmLimitsConfig {
+  double speed_m_s{0.25};
+  double speed_rad_s{1.0};
+  std::array<double, 6> joint_speed_rad_s{1.0, 1.0, 1.5, 2.0, 2.0, 2.0};
+  std::array<double, 6> joint_acceleration_rad_s2{4.0, 4.0, 6.0, 10.0, 10.0, 10.0};
+  std::array<double, 6> joint_lower_rad{-2 * kPi, -2 * kPi, -kPi, -2 * kPi, -2 * kPi, -2 * kPi};
+  std::array<double, 6> joint_upper_rad{2 * kPi, 2 * kPi, kPi, 2 * kPi, 2 * kPi, 2 * kPi};
+  std::array<double, 3> workspace_min_m{-1.2, -1.2, -0.2};
+  std::array<double, 3> workspace_max_m{1.2, 1.2, 1.3};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("speed_m_s", speed_m_s, Range{0.001, 3}, "Greatest speed of the flange.");
+    v.field("speed_rad_s", speed_rad_s, Range{0.001, 10}, "Greatest turning speed of the flange.");
+    v.field("joint_speed_rad_s", joint_speed_rad_s, Range{0.001, 3.2}, "Greatest speed of each joint, base first.");
+    v.field("joint_acceleration_rad_s2", joint_acceleration_rad_s2, Range{0.01, 40},
+            "Greatest acceleration of each joint.");
+    v.field("joint_lower_rad", joint_lower_rad, Range{-2 * kPi, 2 * kPi}, "Lower end of each joint's range.");
+    v.field("joint_upper_rad", joint_upper_rad, Range{-2 * kPi, 2 * kPi}, "Upper end of each joint's range.");
+    v.field("workspace_min_m", workspace_min_m, Range{-2, 2},
+            "Lower corner of the box (frame B) that the flange may "
+            "be in.");
+    v.field("workspace_max_m", workspace_max_m, Range{-2, 2}, "Upper corner of that box.");
+  }
+  [[nodiscard]] std::string problem() const;
+};
+
+enum class Clutch : std::uint8_t { kAbsolute, kRelative };
+inline constexpr std::array<const char*, 2> kClutchNames{"absolute", "relative"};
+
+struct ArmConfig {
+  std::string driver{"ur_rtde"};
+  std::string host{"127.0.0.1"};
+  int port{30004};
+  double frequency_hz{500.0};
+  Clutch clutch{Clutch::kAbsolute};
+  double blend_speed_m_s{0.25};
+  double blend_speed_rad_s{0.8};
+  milliseconds resample_delay{25};
+  ArmLimitsConfig limits;
+
+  template <class V>
+  void visit(V& v) {
+    v.field("driver", driver, "Which driver moves the arm.");
+    v.field("host", host, "Name or address of the arm's controller.");
+    v.field("port", port, Range{1, 65535}, "TCP port of the controller's real-time data exchange (RTDE).");
+    v.field("frequency_hz", frequency_hz, Range{1, 500}, "Packages per second: 500 for e-Series, 125 for CB3.");
+    v.choice("clutch", clutch, kClutchNames,
+             "absolute: the robot goes where the hand is; relative: it repeats the motion since engaging.");
+    v.field("blend_speed_m_s", blend_speed_m_s, Range{0.001, 3},
+            "Speed at which the robot catches up with the hand after engaging.");
+    v.field("blend_speed_rad_s", blend_speed_rad_s, Range{0.001, 10}, "The same for the orientation.");
+    v.field("resample_delay_ms", resample_delay, Range{0, 200},
+            "The hand pose is interpolated this far in the past, so that 100 Hz frames become a smooth 500 Hz path.");
+    v.section("limits", limits, "What no command to the arm exceeds.");
+  }
+};
+
+struct HandConfig {
+  std::string driver{"mia"};
+  std::string device{"/dev/ttyUSB0"};
+  double rate_hz{20.0};
+  int speed_percent{60};
+  double joint_speed_rad_s{2.0};
+  EmbodimentConfig embodiment;  ///< its keys are in this same table
+
+  template <class V>
+  void visit(V& v) {
+    v.file_key("hands/mia.toml", "Hand file with keys of this table (`hands/*.toml`).");
+    v.field("driver", driver, "Which driver moves the robot hand.");
+    v.field("device", device, "Serial device of the hand.");
+    v.field("rate_hz", rate_hz, Range{1, 500}, "Commands per second.");
+    v.field("speed_percent", speed_percent, Range{1, 99}, "Speed of the motors, part of the greatest one.");
+    v.field("joint_speed_rad_s", joint_speed_rad_s, Range{0.01, 20},
+            "Greatest speed of the joint targets that are sent.");
+    v.merge(embodiment);
+  }
+  [[nodiscard]] std::string problem() const;
+};
+
+struct SafetyConfig {
+  milliseconds hold_after{50};
+  milliseconds resume_within{200};
+  int resume_frames{5};
+  milliseconds stop_after{1000};
+  milliseconds mode_timeout{100};
+  milliseconds command_lifetime{20};
+  milliseconds finger_timeout{500};
+  milliseconds unreachable_grace{200};
+  milliseconds arming_grace{300};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("hold_after_ms", hold_after, Range{5, 1000}, "Tracking input older than this: the arm decelerates.");
+    v.field("resume_within_ms", resume_within, Range{0, 1000},
+            "Input that returns within this time, while the arm still decelerates, goes on; later it stays in hold.");
+    v.field("resume_frames", resume_frames, Range{1, 100}, "Good frames in a row that count as returned input.");
+    v.field("stop_after_ms", stop_after, Range{50, 60000}, "Input lost for this long: mode stopped, needs a reset.");
+    v.field("mode_timeout_ms", mode_timeout, Range{20, 1000},
+            "A mode older than this counts as holding for the hand: the arm loop is late or dead.");
+    v.field("command_lifetime_ms", command_lifetime, Range{2, 500}, "A driver refuses a command older than this.");
+    v.field("finger_timeout_ms", finger_timeout, Range{50, 5000}, "Finger angles older than this are not followed.");
+    v.field("unreachable_grace_ms", unreachable_grace, Range{0, 5000},
+            "The hand may leave the workspace or the arm's reach for this long before the arm holds.");
+    v.field("arming_grace_ms", arming_grace, Range{50, 5000},
+            "Time that the program on the robot gets to start following.");
+  }
+  [[nodiscard]] std::string problem() const;
+};
+
+enum class RealtimeMode : std::uint8_t { kEnforce, kTry, kOff };
+inline constexpr std::array<const char*, 3> kRealtimeModeNames{"enforce", "try", "off"};
+
+/// SCHED_FIFO priorities of the threads; network interrupts run at 50.
+struct PriorityConfig {
+  int watchdog{48};
+  int arm{46};
+  int tracker{44};
+  int hand{42};
+  int fingers{40};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("watchdog", watchdog, Range{1, 98}, "Supervises the others: the highest.");
+    v.field("arm", arm, Range{1, 98}, "Arm loop.");
+    v.field("tracker", tracker, Range{1, 98}, "Tracker loop.");
+    v.field("hand", hand, Range{1, 98}, "Hand loop.");
+    v.field("fingers", fingers, Range{1, 98}, "Finger optimisation: the lowest.");
+  }
+  [[nodiscard]] std::string problem() const;
+};
+
+/// Processors that a thread may run on; empty = all.
+struct CpuConfig {
+  std::vector<int> watchdog;
+  std::vector<int> arm;
+  std::vector<int> tracker;
+  std::vector<int> hand;
+  std::vector<int> fingers;
+
+  template <class V>
+  void visit(V& v) {
+    v.field("watchdog", watchdog, Range{0, 1023}, "Processors of the watchdog; empty = all.");
+    v.field("arm", arm, Range{0, 1023}, "Processors of the arm loop.");
+    v.field("tracker", tracker, Range{0, 1023}, "Processors of the tracker loop.");
+    v.field("hand", hand, Range{0, 1023}, "Processors of the hand loop.");
+    v.field("fingers", fingers, Range{0, 1023}, "Processors of the finger optimisation.");
+  }
+};
+
+struct RealtimeConfig {
+  RealtimeMode mode{RealtimeMode::kTry};
+  bool lock_memory{true};
+  PriorityConfig priority;
+  CpuConfig cpus;
+
+  template <class V>
+  void visit(V& v) {
+    v.choice("mode", mode, kRealtimeModeNames,
+             "enforce: refuse to start without real-time rights; try: go on without and say so; off: do not ask.");
+    v.field("lock_memory", lock_memory, "Keep all memory resident (mlockall).");
+    v.section("priority", priority, "Real-time priority (SCHED_FIFO) of each thread.");
+    v.section("cpus", cpus, "Processors that each thread may run on.");
+  }
+};
+
+enum class OnMissing : std::uint8_t { kWait, kExit };
+inline constexpr std::array<const char*, 2> kOnMissingNames{"wait", "exit"};
+
+struct LinksConfig {
+  OnMissing on_missing{OnMissing::kWait};
+  seconds missing_timeout{10};
+  milliseconds retry_first{250};
+  milliseconds retry_longest{2000};
+
+  template <class V>
+  void visit(V& v) {
+    v.choice("on_missing", on_missing, kOnMissingNames,
+             "wait: try for ever to reach a missing device; exit: end after the time-out (exit code 69).");
+    v.field("missing_timeout_s", missing_timeout, Range{1, 3600}, "Time-out of `on_missing = \"exit\"`.");
+    v.field("retry_first_ms", retry_first, Range{10, 60000}, "Wait before the second attempt to connect; doubles.");
+    v.field("retry_longest_ms", retry_longest, Range{10, 60000}, "Longest wait between two attempts.");
+  }
+  [[nodiscard]] std::string problem() const;
+};
+
+struct ControlConfig {
+  std::string socket;
+  bool group_access{false};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("socket", socket,
+            "Path of the control socket. Empty: $RUNTIME_DIRECTORY/control.sock under systemd, else "
+            "$XDG_RUNTIME_DIR/embody/control.sock, else /tmp/embody-UID/control.sock.");
+    v.field("group_access", group_access, "Let the group of the daemon use the socket (0660 instead of 0600).");
+  }
+};
+
+enum class Side : std::uint8_t { kRight, kLeft };
+inline constexpr std::array<const char*, 2> kSideNames{"right", "left"};
+
+struct DdsConfig {
+  bool enabled{true};
+  int domain{0};
+  std::string interface { "lo" };
+  Side side{Side::kRight};
+
+  template <class V>
+  void visit(V& v) {
+    v.field("enabled", enabled, "Publish topics.");
+    v.field("domain", domain, Range{0, 232}, "DDS domain (ROS_DOMAIN_ID).");
+    v.field("interface", interface, "Network interface of the topics; lo = this computer only.");
+    v.choice("side", side, kSideNames, "Which hand: part of the topic names (rt/embody/right/...).");
+  }
+};
+
+enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarning, kError };
+inline constexpr std::array<const char*, 4> kLogLevelNames{"debug", "info", "warning", "error"};
+
+struct LogConfig {
+  LogLevel level{LogLevel::kInfo};
+
+  template <class V>
+  void visit(V& v) {
+    v.choice("level", level, kLogLevelNames, "What is logged.");
+  }
+};
+
+struct EmbodyConfig {
+  int schema{kSchema};
+  TrackerConfig tracker;
+  GloveConfig glove;
+  SubjectConfig subject;
+  RecordMappingConfig record_mapping;
+  CellConfig cell;
+  ArmConfig arm;
+  HandConfig hand;
+  SafetyConfig safety;
+  RealtimeConfig realtime;
+  LinksConfig links;
+  ControlConfig control;
+  DdsConfig dds;
+  LogConfig log;
+
+  /// Files that were read, the main one first. No key.
+  std::vector<std::string> files;
+
+  template <class V>
+  void visit(V& v) {
+    v.schema(schema, "Version of this format; every configuration file starts with it.");
+    v.section("tracker", tracker, "The hand tracker.");
+    v.section("glove", glove, "The marker glove.");
+    v.section("subject", subject, "The person who wears it.");
+    v.section("record_mapping", record_mapping, "From markers to the state of the human hand.");
+    v.section("cell", cell, "Where things stand in the robot cell.");
+    v.section("arm", arm, "The robot arm.");
+    v.section("hand", hand, "The robot hand and the mapping of fingers to it.");
+    v.section("safety", safety, "When motion ends.");
+    v.section("realtime", realtime, "Scheduling.");
+    v.section("links", links, "Connections to the devices.");
+    v.section("control", control, "The control socket.");
+    v.section("dds", dds, "Topics for observers.");
+    v.section("log", log, "Log messages (standard error).");
+  }
+};
+
+}  // namespace embody::config
+
+namespace embody {
+using config::EmbodyConfig;
+}  // namespace embody

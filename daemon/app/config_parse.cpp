@@ -1,0 +1,398 @@
+// Parsing: the visitor that fills the configuration structs from TOML. The only place that includes toml++.
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <type_traits>
+
+#include "daemon/app/config_file.hpp"
+#include "daemon/app/config_io.hpp"
+
+namespace embody::config {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A message with its place, collected so that the first in the file is reported.
+struct Problem {
+  std::string where;  // FILE:LINE
+  std::string text;
+};
+
+/// One file being read.
+struct Source {
+  std::string name;  // for messages
+  fs::path folder;
+  bool included{false};
+};
+
+/// What all readers of one load share.
+struct Load {
+  std::vector<Problem> problems;
+  std::vector<std::string> files;
+  Errc code{Errc::kMalformed};
+};
+
+std::string place(const Source& source, const toml::source_region& region) {
+  return region.begin.line == 0 ? source.name : source.name + ":" + std::to_string(region.begin.line);
+}
+
+/// Parses TOML text. On failure adds a problem with line and column and returns an empty table.
+toml::table parse_text(std::string_view text, const Source& source, Load& load) {
+  try {
+    return toml::parse(text, std::string_view(source.name));
+  } catch (const toml::parse_error& error) {
+    const auto begin = error.source().begin;
+    load.problems.push_back({source.name + ":" + std::to_string(begin.line) + ":" + std::to_string(begin.column),
+                             std::string(error.description())});
+    return {};
+  }
+}
+
+const char* type_name(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "a list";
+    case toml::node_type::string:
+      return "text";
+    case toml::node_type::integer:
+      return "a whole number";
+    case toml::node_type::floating_point:
+      return "a number with a fraction";
+    case toml::node_type::boolean:
+      return "true/false";
+    default:
+      return "a date or time";
+  }
+}
+
+std::string wanted(const char* what, const toml::node& node) {
+  return std::string("must be ") + what + ", not " + type_name(node);
+}
+
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+/// The readers of values return why the node is not acceptable, or "".
+std::string check_range(double value, Range range, std::string_view unit) {
+  if (value >= range.min && value <= range.max) return {};
+  return "is " + number_text(value) + ", out of range: " + number_text(range.min) + " to " + number_text(range.max) +
+         (unit.empty() ? "" : " ") + std::string(unit);
+}
+
+std::string read_value(const toml::node& node, double& value, Range range, std::string_view unit) {
+  if (!node.is_number()) return wanted("a number", node);
+  const double number = node.is_integer() ? static_cast<double>(**node.as_integer()) : **node.as_floating_point();
+  if (!std::isfinite(number)) return "must be finite, not nan or inf";
+  auto why = check_range(number, range, unit);
+  if (why.empty()) value = number;
+  return why;
+}
+
+std::string read_value(const toml::node& node, int& value, Range range, std::string_view unit) {
+  const auto* integer = node.as_integer();
+  if (integer == nullptr) return wanted("a whole number", node);
+  auto why = check_range(static_cast<double>(**integer), range, unit);
+  if (why.empty()) value = static_cast<int>(**integer);
+  return why;
+}
+
+template <class Rep, class Period>
+std::string read_value(const toml::node& node, std::chrono::duration<Rep, Period>& value, Range range,
+                       std::string_view unit) {
+  int count = 0;
+  auto why = read_value(node, count, range, unit);
+  if (why.empty()) value = std::chrono::duration<Rep, Period>(count);
+  return why;
+}
+
+std::string read_value(const toml::node& node, bool& value, Range, std::string_view) {
+  if (!node.is_boolean()) return wanted("true or false", node);
+  value = **node.as_boolean();
+  return {};
+}
+
+constexpr std::size_t kMaxText = 256;
+
+std::string read_value(const toml::node& node, std::string& value, Range, std::string_view) {
+  const auto* text = node.as_string();
+  if (text == nullptr) return wanted("text", node);
+  const std::string& content = **text;
+  if (content.size() > kMaxText) return "is longer than " + std::to_string(kMaxText) + " bytes";
+  if (std::any_of(content.begin(), content.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
+    return "contains a control character";
+  }
+  value = content;
+  return {};
+}
+
+constexpr std::size_t kMaxItems = 64;  // of a list
+
+/// A list of any length, or exactly as many numbers as a fixed array has.
+template <class T>
+requires requires(T& sequence) {
+  sequence.begin();
+}
+std::string read_value(const toml::node& node, T& value, Range range, std::string_view unit) {
+  const auto* array = node.as_array();
+  if (array == nullptr) return wanted("a list", node);
+  T items = value;
+  if constexpr (requires { items.clear(); }) {
+    if (array->size() > kMaxItems) return "has more than " + std::to_string(kMaxItems) + " entries";
+    items.resize(array->size());
+  } else if (array->size() != static_cast<std::size_t>(items.size())) {
+    return "needs " + std::to_string(items.size()) + " numbers, has " + std::to_string(array->size());
+  }
+  std::size_t i = 0;
+  for (auto& item : items) {
+    const auto why = read_value((*array)[i], item, range, unit);
+    if (!why.empty()) return "entry " + std::to_string(i + 1) + " " + why;
+    ++i;
+  }
+  value = items;
+  return {};
+}
+
+/// Edits (insert, delete, replace) between two words.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string table_text(const std::string& table) {
+  return table.empty() ? "at the top of the file" : "in [" + table + "]";
+}
+
+/// Fills the struct `self` from one table. `table_name` is its name in its own file, for messages.
+template <class S>
+class Reader {
+ public:
+  Reader(S& self, const toml::table& table, std::string table_name, const Source& source, Load& load)
+      : self_(self), table_(table), table_name_(std::move(table_name)), source_(source), load_(load) {}
+
+  void run() {
+    const std::size_t before = load_.problems.size();
+    visit(*this, self_);
+    if (source_.included && table_name_.empty()) known_.emplace_back("schema");
+    report_unknown_keys();
+    if constexpr (requires { self_.problem(); }) {
+      if (source_.included || load_.problems.size() != before) return;  // complete only with the including table
+      if (const std::string why = self_.problem(); !why.empty()) report(table_.source(), why);
+    }
+  }
+
+  void schema(int& value, const char*) {
+    const toml::node* node = find("schema");
+    if (node == nullptr) return report({}, "the schema number is missing: start the file with schema = 1");
+    const auto why = read_value(*node, value, Range{kSchema, kSchema}, "");
+    if (!why.empty()) {
+      report(node->source(), "schema " + why + "; this program reads schema " + std::to_string(kSchema));
+    }
+  }
+
+  template <class T>
+  void field(const char* key, T& value, const char*) {
+    read(key, value, Range{});
+  }
+  template <class T>
+  void field(const char* key, T& value, Range range, const char*) {
+    read(key, value, range);
+  }
+
+  template <class E, class Names>
+  void choice(const char* key, E& value, const Names& names, const char*) {
+    std::string text;
+    const toml::node* node = read(key, text, Range{});
+    if (node == nullptr) return;
+    std::string options;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (text == names[i]) {
+        value = static_cast<E>(i);
+        return;
+      }
+      options += (i == 0 ? "\"" : i + 1 < names.size() ? ", \"" : " or \"") + std::string(names[i]) + "\"";
+    }
+    report(node->source(), std::string(key) + " must be " + options + ", not \"" + text.substr(0, 40) + "\"");
+  }
+
+  void path(const char* key, std::string& value, const char*) {
+    std::string text;
+    const toml::node* node = read(key, text, Range{});
+    if (node == nullptr) return;
+    value = text.empty() ? text : locate(key, text, node->source());
+  }
+
+  void file_key(const char* fallback, const char*) {
+    if (source_.included) {
+      if (find("file") != nullptr) report(table_.source(), "an included file cannot include another (key 'file')");
+      return;
+    }
+    std::string text = fallback;
+    const toml::node* node = read("file", text, Range{});
+    if (!text.empty()) include(text, node == nullptr ? table_.source() : node->source());
+  }
+
+  template <class T>
+  void list(const char* key, std::vector<T>& items, const char*) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const auto* array = node->as_array();
+    if (array == nullptr) return report(node->source(), std::string(key) + " " + wanted("a list of tables", *node));
+    if (array->size() > kMaxItems) return report(node->source(), std::string(key) + " has too many entries");
+    items.assign(array->size(), T{});
+    for (std::size_t i = 0; i < items.size(); ++i) read_table(key, (*array)[i], items[i]);
+  }
+
+  template <class T>
+  void section(const char* key, T& value, const char*) {
+    static const toml::table kEmpty;
+    const toml::node* node = find(key);
+    read_table(key, node == nullptr ? kEmpty : *node, value);
+  }
+
+  template <class T>
+  void merge(T& value) {
+    visit(*this, value);
+  }
+
+ private:
+  [[nodiscard]] const toml::node* find(const char* key) {
+    known_.emplace_back(key);
+    return table_.get(key);
+  }
+
+  /// Returns the node when the key is there and acceptable.
+  template <class T>
+  const toml::node* read(const char* key, T& value, Range range) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return nullptr;
+    const auto why = read_value(*node, value, range, unit_of(key));
+    if (why.empty()) return node;
+    report(node->source(), std::string(key) + " " + why);
+    return nullptr;
+  }
+
+  template <class T>
+  void read_table(const char* key, const toml::node& node, T& value) {
+    const auto* table = node.as_table();
+    if (table == nullptr) return report(node.source(), std::string(key) + " " + wanted("a table", node));
+    Reader<T>(value, *table, table_name_.empty() ? key : table_name_ + "." + key, source_, load_).run();
+  }
+
+  void include(const std::string& text, const toml::source_region& region) {
+    const std::string found = locate("file", text, region);
+    if (found.empty()) return;
+    const auto content = read_file(found);
+    if (!content) {
+      load_.code = content.error().code;
+      return report(region, std::string(content.error().detail.view()));
+    }
+    load_.files.push_back(found);
+    const Source inner{found, fs::path(found).parent_path(), true};
+    const toml::table table = parse_text(*content, inner, load_);
+    check_included_schema(table, inner);
+    Reader<S>(self_, table, "", inner, load_).run();
+  }
+
+  void check_included_schema(const toml::table& table, const Source& inner) {
+    const toml::node* node = table.get("schema");
+    int value = 0;
+    if (node == nullptr) return;
+    const auto why = read_value(*node, value, Range{kSchema, kSchema}, "");
+    if (!why.empty()) load_.problems.push_back({place(inner, node->source()), "schema " + why});
+  }
+
+  std::string locate(const char* key, const std::string& text, const toml::source_region& region) {
+    const auto found = find_data_file(text, source_.folder);
+    if (found) return found->string();
+    load_.code = Errc::kNotFound;
+    report(region, std::string(key) + ": " + std::string(found.error().detail.view()));
+    return {};
+  }
+
+  void report_unknown_keys() {
+    for (const auto& [key, node] : table_) {
+      const std::string_view name = key.str();
+      if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
+      load_.problems.push_back({place(source_, key.source()), "unknown key '" + std::string(name.substr(0, 40)) + "' " +
+                                                                  table_text(table_name_) + suggestion(name)});
+    }
+  }
+
+  /// "; did you mean ...?": the same name in another table, else the nearest of this table, else nothing.
+  [[nodiscard]] std::string suggestion(std::string_view name) const {
+    const std::string_view word = name.substr(0, 64);
+    std::string_view nearest;
+    std::size_t best = std::max<std::size_t>(2, word.size() * 2 / 5) + 1;
+    for (const std::string& candidate : known_) {
+      const std::size_t distance = edit_distance(word, candidate);
+      if (distance < best) {
+        best = distance;
+        nearest = candidate;
+      }
+    }
+    if (best > 2) {
+      for (const KeyName& other : all_keys()) {
+        if (other.key == name) return "; it belongs " + table_text(other.table);
+      }
+    }
+    return nearest.empty() ? std::string() : "; did you mean '" + std::string(nearest) + "'?";
+  }
+
+  void report(const toml::source_region& region, const std::string& text) {
+    const std::string table = table_name_.empty() ? "" : "[" + table_name_ + "] ";
+    load_.problems.push_back({place(source_, region), table + text});
+  }
+
+  S& self_;
+  const toml::table& table_;
+  std::string table_name_;
+  const Source& source_;
+  Load& load_;
+  std::vector<std::string> known_;
+};
+
+/// One sentence: the first problem and how many others there are.
+Error to_error(const Load& load) {
+  const Problem& first = load.problems.front();
+  const std::size_t more = load.problems.size() - 1;
+  const std::string rest = more == 0 ? "" : " (and " + std::to_string(more) + " more)";
+  return make_error(load.code, "%s: %s%s", shorten_path(first.where).c_str(), first.text.c_str(), rest.c_str());
+}
+
+}  // namespace
+
+Result<EmbodyConfig> parse_config(std::string_view text, const std::string& name, const fs::path& folder) {
+  if (text.size() > kMaxConfigBytes) {
+    return make_error(Errc::kMalformed, "%s: larger than %zu bytes: this is no configuration file",
+                      shorten_path(name).c_str(), kMaxConfigBytes);
+  }
+  Load load;
+  const Source source{name, folder, false};
+  const toml::table table = parse_text(text, source, load);
+  if (!load.problems.empty()) return to_error(load);
+  EmbodyConfig config;
+  load.files.push_back(name);
+  Reader<EmbodyConfig>(config, table, "", source, load).run();
+  if (!load.problems.empty()) return to_error(load);
+  config.files = std::move(load.files);
+  return config;
+}
+
+}  // namespace embody::config

@@ -1,0 +1,57 @@
+#include "daemon/app/control_handler.hpp"
+
+#include <spdlog/spdlog.h>
+
+namespace embody {
+namespace {
+
+using control::Command;
+using control::Request;
+using control::Response;
+
+/// One sentence: why not, and what would help.
+std::string explain(safety::RequestKind kind, const safety::ModeState& mode) {
+  const std::string name = safety::to_string(mode.mode);
+  const std::string cause = safety::to_string(mode.cause);
+  const std::string now = "mode is " + name + (cause.empty() ? "" : " (" + cause + ")");
+  if (kind == safety::RequestKind::kEngage) {
+    if (mode.mode == safety::Mode::kStopped) return now + ": remove the cause, then reset, then engage";
+    return now + ": engaging needs mode aligned";
+  }
+  if (kind == safety::RequestKind::kReset) return now + ": the cause is still there";
+  return now;
+}
+
+Response decide(Daemon& daemon, safety::RequestKind kind) {
+  const Decision decision = daemon.request(kind);
+  if (decision.accepted) {
+    return {true, std::string(R"({"mode":")") + safety::to_string(decision.mode.mode) + "\"}", "", ""};
+  }
+  return control::refusal(control::code::kRefused, explain(kind, decision.mode));
+}
+
+}  // namespace
+
+control::ControlServer::Handler make_control_handler(Daemon& daemon, bool& shutdown) {
+  return [&daemon, &shutdown](const Request& request) -> Response {
+    if (request.command == Command::kStatus) return {true, daemon.status_json(), "", ""};
+    spdlog::info("{} asked by uid {} pid {}", control::to_string(request.command), request.peer.uid, request.peer.pid);
+    switch (request.command) {
+      case Command::kEngage:
+        return decide(daemon, safety::RequestKind::kEngage);
+      case Command::kDisengage:
+        return decide(daemon, safety::RequestKind::kDisengage);
+      case Command::kStop:
+        return decide(daemon, safety::RequestKind::kStop);
+      case Command::kReset:
+        return decide(daemon, safety::RequestKind::kReset);
+      case Command::kShutdown:
+        shutdown = true;
+        return {};
+      default:
+        return control::refusal(control::code::kMalformed, "not a command of this daemon");
+    }
+  };
+}
+
+}  // namespace embody

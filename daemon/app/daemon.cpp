@@ -1,0 +1,209 @@
+#include "daemon/app/daemon.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <thread>
+
+#include "daemon/app/heap_guard.hpp"
+#include "drivers/mia/mia_hand.hpp"
+#include "drivers/qualisys/qualisys_tracker.hpp"
+#include "drivers/transport/clock.hpp"
+#include "drivers/ur_rtde/ur_rtde_arm.hpp"
+
+namespace embody {
+namespace {
+
+using transport::now;
+
+std::unique_ptr<HandTracker> make_tracker(const config::EmbodyConfig& config) {
+  qualisys::QualisysConfig qualisys;
+  qualisys.host = config.tracker.host;
+  qualisys.port = static_cast<std::uint16_t>(config.tracker.port);
+  qualisys.allow_playback = config.tracker.allow_playback;
+  return std::make_unique<qualisys::QualisysTracker>(qualisys, config.glove.names);
+}
+
+std::unique_ptr<ArmDriver> make_arm(const config::ArmConfig& config) {
+  UrRtdeConfig ur;
+  ur.host = config.host;
+  ur.port = static_cast<std::uint16_t>(config.port);
+  ur.frequency_hz = config.frequency_hz;
+  return std::make_unique<UrRtdeArm>(ur);
+}
+
+std::unique_ptr<HandDriver> make_hand(const config::HandConfig& config) {
+  mia::MiaConfig mia;
+  mia.device = config.device;
+  mia.speed_percent = config.speed_percent;
+  mia.lateral_thumb = config.embodiment.thumb_mode == ThumbMode::kLateral;
+  return std::make_unique<mia::MiaHand>(mia);
+}
+
+safety::ModeConfig mode_config(const config::SafetyConfig& config) {
+  safety::ModeConfig modes;
+  modes.hold_after = config.hold_after;
+  modes.resume_within = config.resume_within;
+  modes.resume_frames = static_cast<std::uint32_t>(config.resume_frames);
+  modes.stop_after = config.stop_after;
+  modes.unreachable_grace = config.unreachable_grace;
+  return modes;
+}
+
+ArmLoopConfig arm_loop_config(const config::EmbodyConfig& config) {
+  return {from_seconds(1.0 / config.arm.frequency_hz), config.safety.command_lifetime, config.safety.arming_grace};
+}
+
+safety::HandGateConfig hand_gate_config(const config::EmbodyConfig& config) {
+  return {config.hand.joint_speed_rad_s, config.safety.mode_timeout, config.safety.finger_timeout};
+}
+
+/// A link over one baton; `service` may be empty.
+template <class Driver, class Info>
+Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<std::string()> reason,
+               std::function<Status()> service) {
+  Link link;
+  link.name = name;
+  link.with_links = [&baton] { return baton.with_links(); };
+  link.connect = [&baton]() -> Result<std::string> {
+    const Result<Info> info = baton.driver().connect();
+    if (!info) return info.error();
+    (void)baton.take_revoked();
+    baton.pass_to_loop(*info);
+    return std::string(info->peer.view());
+  };
+  link.service = std::move(service);
+  link.revoke = [&baton] { baton.revoke(); };
+  link.reason = std::move(reason);
+  return link;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& config) {
+  Result<Models> models = make_models(config);
+  if (!models) return models.error();
+  embody::DdsConfig dds;
+  dds.enabled = config.dds.enabled;
+  dds.domain = config.dds.domain;
+  dds.interface = config.dds.interface;
+  dds.side = config::kSideNames[static_cast<std::size_t>(config.dds.side)];
+  Result<DdsPublisher> publisher = DdsPublisher::create(dds);
+  if (!publisher) return publisher.error();
+  return std::unique_ptr<Daemon>(new Daemon(config, std::move(*models), make_tracker(config), make_arm(config.arm),
+                                            make_hand(config.hand), std::move(*publisher)));
+}
+
+Daemon::Daemon(const config::EmbodyConfig& config, Models models, std::unique_ptr<HandTracker> tracker,
+               std::unique_ptr<ArmDriver> arm, std::unique_ptr<HandDriver> hand, DdsPublisher publisher)
+    : config_(config),
+      tracker_(std::move(tracker)),
+      arm_(std::move(arm)),
+      hand_(std::move(hand)),
+      tracker_baton_(*tracker_),
+      arm_baton_(*arm_),
+      hand_baton_(*hand_),
+      tracker_loop_(tracker_baton_, models.hand_pose, edges_),
+      finger_loop_(models.fingers, models.embodiment,
+                   {config.record_mapping.slow_down, config.record_mapping.slow_down_spins}, edges_),
+      arm_loop_(arm_baton_, tracker_baton_, models.arm, mode_config(config.safety), arm_loop_config(config), edges_),
+      hand_loop_(hand_baton_, hand_gate_config(config), {from_seconds(1.0 / config.hand.rate_hz)}, edges_),
+      watchdog_loop_(arm_baton_, edges_),
+      telemetry_(std::make_unique<TelemetryLoop>(edges_, std::move(publisher), models.embodiment)),
+      links_(std::make_unique<LinksLoop>(
+          make_links(), embody::LinksConfig{config.links.retry_first, config.links.retry_longest}, edges_)) {}
+
+Daemon::~Daemon() {
+  stop();
+}
+
+std::vector<Link> Daemon::make_links() {
+  auto& tracker = static_cast<qualisys::QualisysTracker&>(*tracker_);
+  auto& arm = static_cast<UrRtdeArm&>(*arm_);
+  std::vector<Link> links;
+  links.push_back(make_link(
+      "tracker", tracker_baton_, [&tracker] { return std::string(tracker.last_error().view()); },
+      [&tracker] { return tracker.service(); }));
+  links.push_back(make_link("arm", arm_baton_, [&arm] { return std::string(arm.reason()); }, {}));
+  links.push_back(make_link("hand", hand_baton_, [] { return std::string("it no longer answers"); }, {}));
+  return links;
+}
+
+ThreadOptions Daemon::options(const char* name, int priority, const std::vector<int>& cpus) const {
+  return {name, realtime_.scheduled ? priority : 0, cpus, true};
+}
+
+Status Daemon::start() {
+  const config::RealtimeConfig& realtime = config_.realtime;
+  if (realtime.mode != config::RealtimeMode::kOff) {
+    realtime_.scheduled = may_use_fifo(realtime.priority.watchdog);
+    if (!realtime_.scheduled) {
+      realtime_.warning = "no real-time scheduling: raise LimitRTPRIO or 'ulimit -r', or set realtime.mode = \"off\"";
+    }
+    const Status locked = realtime.lock_memory ? lock_memory() : Status{};
+    realtime_.locked = realtime.lock_memory && locked.ok();
+    if (!locked) {
+      if (!realtime_.warning.empty()) realtime_.warning += "; ";
+      realtime_.warning += locked.error().detail.view();
+    }
+    if (!realtime_.warning.empty()) {
+      if (realtime.mode == config::RealtimeMode::kEnforce) {
+        return make_error(Errc::kPermission, "%s", realtime_.warning.c_str());
+      }
+      spdlog::warn("{}", realtime_.warning);
+    }
+  }
+  t_start_ = now();
+  running_ = true;
+  const config::PriorityConfig& p = realtime.priority;
+  const config::CpuConfig& cpus = realtime.cpus;
+  // Consumers before producers; links last, for it connects the devices.
+  if (Status s = arm_thread_.start(options("arm", p.arm, cpus.arm), [this] { arm_loop_.run(); }); !s) return s;
+  if (Status s = hand_thread_.start(options("hand", p.hand, cpus.hand), [this] { hand_loop_.run(); }); !s) return s;
+  if (Status s = finger_thread_.start(options("fingers", p.fingers, cpus.fingers), [this] { finger_loop_.run(); }); !s)
+    return s;
+  if (Status s = tracker_thread_.start(options("tracker", p.tracker, cpus.tracker), [this] { tracker_loop_.run(); });
+      !s)
+    return s;
+  if (Status s =
+          watchdog_thread_.start(options("watchdog", p.watchdog, cpus.watchdog), [this] { watchdog_loop_.run(); });
+      !s)
+    return s;
+  if (Status s = telemetry_thread_.start({"telemetry", 0, {}, false}, [this] { telemetry_->run(); }); !s) return s;
+  return links_thread_.start({"links", 0, {}, false}, [this] { links_->run(); });
+}
+
+void Daemon::stop() {
+  if (!running_) return;
+  running_ = false;
+  request(safety::RequestKind::kShutdown);
+  edges_.stop.store(true, std::memory_order_relaxed);
+  finger_thread_.join();
+  tracker_thread_.join();
+  hand_thread_.join();
+  arm_thread_.join();  // stays until the arm stands still
+  watchdog_thread_.join();
+  telemetry_thread_.join();
+  links_thread_.join();
+}
+
+Decision Daemon::request(safety::RequestKind kind) {
+  const safety::Request request{kind, ++request_id_};
+  edges_.requests.push(request);
+  const TimePoint deadline = now() + std::chrono::milliseconds(200);
+  while (mode().request_id != request.id && now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  const safety::ModeState decided = mode();
+  return {decided.request_id == request.id && decided.request_accepted, decided};
+}
+
+safety::ModeState Daemon::mode() {
+  edges_.mode_to_main.update();
+  return edges_.mode_to_main.get();
+}
+
+bool Daemon::healthy() const {
+  return !edges_.watchdog_bit.load(std::memory_order_relaxed);
+}
+
+}  // namespace embody

@@ -1,0 +1,18 @@
+#pragma once
+// How a subcommand of embodyctl registers itself: main.cpp holds the list.
+
+namespace CLI {
+class App;
+}
+
+namespace embody::ctl {
+
+/// `add` adds one or more subcommands to `app`; their callbacks write `exit_code` (see exit_code.hpp).
+struct Command {
+  void (*add)(CLI::App& app, int& exit_code);
+};
+
+/// status, engage, disengage, stop, reset, shutdown: the clients of the control socket.
+void add_control_commands(CLI::App& app, int& exit_code);
+
+}  // namespace embody::ctl

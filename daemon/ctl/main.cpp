@@ -1,0 +1,46 @@
+// embodyctl: control client of embodyd, and its offline tools.
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdio>
+#include <exception>
+
+#include "daemon/control/exit_code.hpp"
+#include "daemon/ctl/command.hpp"
+
+namespace {
+
+constexpr std::array kCommands{
+    embody::ctl::Command{&embody::ctl::add_control_commands},
+};
+
+constexpr const char* kFooter =
+    "Exit codes: 0 done, 1 failed, 2 usage, 3 refused in this mode, 4 the robot did not follow,\n"
+    "69 daemon or device not there, 77 not permitted, 78 configuration, 130 interrupted.";
+
+int run(int argc, char** argv) {
+  int exit_code = embody::kExitOk;
+  CLI::App app("Controls embodyd, the daemon that lets a person drive a robot arm and hand with their own hand.");
+  app.set_version_flag("--version", "embodyctl " EMBODY_VERSION);
+  app.require_subcommand(0, 1);
+  app.footer(kFooter);
+  for (const auto& command : kCommands) command.add(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? embody::kExitOk : embody::kExitUsage;
+  }
+  if (!app.get_subcommands().empty()) return exit_code;
+  std::fputs(app.help().c_str(), stderr);
+  return embody::kExitUsage;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "embodyctl: %s\n", error.what());
+    return embody::kExitFailed;
+  }
+}

@@ -1,0 +1,163 @@
+#include "daemon/loops/arm_loop.hpp"
+
+#include <algorithm>
+
+#include "drivers/transport/clock.hpp"
+
+namespace embody {
+
+using safety::Mode;
+using transport::now;
+
+void ArmLoop::run() noexcept {
+  TimePoint t_stop{};
+  while (true) {
+    wait_for_input(arm_.fd(), -1, 2 * config_.period);
+    edges_.heartbeats.arm.fetch_add(1, std::memory_order_relaxed);
+    read_packages();
+    if (!edges_.stop.load(std::memory_order_relaxed)) continue;
+    if (t_stop == TimePoint{}) t_stop = now();
+    const bool still = !arm_alive_ || (!commanding_ && machine_.state().mode == Mode::kStopped);
+    if (still || now() - t_stop > kStopTime) break;
+  }
+  edges_.arm_finished.store(true, std::memory_order_release);
+}
+
+/// Every package is answered by one command. After a stall of this machine the backlog is worked off in order, but at
+/// most kBurst packages of it; older ones are passed over and counted.
+void ArmLoop::read_packages() noexcept {
+  constexpr int kBurst = 16;
+  int packages = 0;
+  if (arm_.with_loop()) {
+    if (arm_.take_revoked()) return lose_arm();
+    for (; packages < kBurst; ++packages) {
+      const IoStatus status = arm_.driver().read(report_.state);
+      if (status == IoStatus::kDisconnected) return lose_arm();
+      if (status != IoStatus::kDone) break;
+      edges_.counters.robot_packages.fetch_add(1, std::memory_order_relaxed);
+      arm_alive_ = true;
+      tick(now());
+    }
+  }
+  if (packages > 0) return;
+  // Without a package a time-out is still a tick of the mode machine.
+  const TimePoint t = now();
+  constexpr Duration kSilence = std::chrono::milliseconds(100);
+  if (arm_alive_ && t - t_package_ > kSilence) return lose_arm();
+  take_pose();
+  step_modes(t);
+}
+
+void ArmLoop::lose_arm() noexcept {
+  if (arm_.with_loop()) arm_.give_back();
+  arm_alive_ = false;
+  commanding_ = false;
+  report_.state = {};
+  last_controller_time_ = Duration{0};
+  step_modes(now());
+}
+
+void ArmLoop::take_pose() noexcept {
+  if (!edges_.pose_to_arm.update()) return;
+  pose_is_new_ = true;
+  const HandPose& pose = edges_.pose_to_arm.get();
+  streak_ = pose.streak;
+  if (!pose.valid) return;
+  t_pose_ = pose.t_capture;
+  controller_.add(pose.t_capture, pose.X_WM);
+}
+
+void ArmLoop::tick(TimePoint t_tick) noexcept {
+  const ArmState& state = report_.state;
+  const Duration elapsed = state.controller_time - last_controller_time_;
+  const Duration largest = 10 * config_.period;
+  const Duration dt =
+      last_controller_time_ == Duration{0} ? config_.period : std::clamp(elapsed, config_.period, largest);
+  if (last_controller_time_ != Duration{0} && elapsed > config_.period) {
+    const auto skipped = static_cast<std::uint64_t>((elapsed + config_.period / 2) / config_.period - 1);
+    edges_.counters.robot_packages_skipped.fetch_add(skipped, std::memory_order_relaxed);
+  }
+  last_controller_time_ = state.controller_time;
+  t_package_ = state.t_arrival;
+  const TimePoint t_robot = robot_clock_.map(state.controller_time, state.t_arrival);
+
+  take_pose();
+  step_modes(t_tick);
+  send(step_controller(t_robot, to_seconds(dt)), t_tick);
+  edges_.arm_to_telemetry.publish(report_);
+}
+
+void ArmLoop::step_modes(TimePoint t) noexcept {
+  safety::Health health;
+  health.tracker_connected = tracker_.fd() >= 0;
+  health.t_pose = t_pose_;
+  health.fresh_streak = streak_;
+  health.arm_connected = arm_alive_;
+  health.arm = report_.state.condition;
+  health.arm_following = arm_following(t);
+  health.arm_at_rest = controller_.at_rest();
+  health.hand_connected = edges_.hand_ready.load(std::memory_order_relaxed);
+  health.target_reachable = reachable_;
+  health.watchdog_bit = edges_.watchdog_bit.load(std::memory_order_relaxed);
+  safety::Request request;
+  const bool asked = edges_.requests.pop(request);
+  const bool was_moving = is_moving_mode(machine_.state().mode);
+  const Mode before = machine_.state().mode;
+  report_.mode = machine_.step(t, asked ? &request : nullptr, health);
+  if (report_.mode.mode == Mode::kEngaged && before != Mode::kEngaged) engage_pending_ = true;
+  if (is_moving_mode(report_.mode.mode) && !was_moving) tracked_ = false;
+  edges_.mode_to_hand.publish(report_.mode);
+  edges_.mode_to_main.publish(report_.mode);
+  edges_.mode_to_telemetry.publish(report_.mode);
+}
+
+/// Whether the robot's program does what it should: it gets a grace to start tracking, but must not leave off.
+bool ArmLoop::arm_following(TimePoint t) const noexcept {
+  if (!is_moving_mode(machine_.state().mode) || report_.state.tracking) return true;
+  return !tracked_ && t - machine_.state().t_since < config_.arming_grace;
+}
+
+teleop::ArmReference ArmLoop::step_controller(TimePoint t_robot, double dt_s) noexcept {
+  const ArmState& state = report_.state;
+  const bool moving = is_moving_mode(report_.mode.mode);
+  if (moving && state.tracking) tracked_ = true;
+  commanding_ = state.condition == ArmCondition::kReady && (moving || !controller_.at_rest());
+  if (!commanding_) {
+    reachable_ = controller_.track_measured(t_robot, state.q_target_rad);
+    return {Pose::Identity(), state.q_target_rad, Vector6::Zero(), reachable_};
+  }
+  if (report_.mode.mode != Mode::kEngaged || !tracked_) return controller_.brake(dt_s);
+  if (engage_pending_) {
+    controller_.engage(t_robot);
+    engage_pending_ = false;
+  }
+  const teleop::ArmReference reference = controller_.follow(t_robot, dt_s);
+  reachable_ = reference.reachable;
+  return reference;
+}
+
+void ArmLoop::send(const teleop::ArmReference& reference, TimePoint t_tick) noexcept {
+  ArmCommand& command = report_.command;
+  command.sequence = ++sequence_;
+  command.action = commanding_ ? ArmAction::kTrack : ArmAction::kHold;
+  command.q_rad = reference.q_rad;
+  command.qd_rad_s = reference.qd_rad_s;
+  command.t_capture = t_pose_;
+  command.t_expires = report_.state.t_arrival + config_.command_lifetime;
+  report_.X_BEd = reference.X_BEd;
+  const TimePoint t_computed = now();
+  const IoStatus status = arm_.driver().write(command, t_computed);
+  const TimePoint t_written = now();
+  if (status == IoStatus::kDone) {
+    edges_.counters.arm_commands.fetch_add(1, std::memory_order_relaxed);
+  } else {
+    edges_.counters.arm_commands_dropped.fetch_add(1, std::memory_order_relaxed);
+    --sequence_;  // the robot sees consecutive numbers
+  }
+  if (!pose_is_new_ || status != IoStatus::kDone) return;
+  pose_is_new_ = false;
+  const HandPose& pose = edges_.pose_to_arm.get();
+  edges_.arm_timings.push({pose.t_arrival, pose.t_decoded, pose.t_estimated, t_tick, t_computed, t_written});
+}
+
+}  // namespace embody

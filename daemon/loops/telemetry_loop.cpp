@@ -1,0 +1,171 @@
+#include "daemon/loops/telemetry_loop.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "core/robot/ur_kinematics.hpp"
+#include "drivers/transport/clock.hpp"
+
+namespace embody {
+namespace {
+
+constexpr auto kRelaxed = std::memory_order_relaxed;
+constexpr std::array<const char*, 6> kArmJoints{"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
+                                                "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
+
+}  // namespace
+
+TelemetryLoop::TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand)
+    : edges_(edges), publisher_(std::move(publisher)), hand_(std::move(hand)) {
+  joint_names_.assign(kArmJoints.begin(), kArmJoints.end());
+  joint_names_.insert(joint_names_.end(), hand_.urdf_joint_names().begin(), hand_.urdf_joint_names().end());
+}
+
+void TelemetryLoop::run() {
+  constexpr auto kPeriod = std::chrono::milliseconds(20);
+  TimePoint t_next = transport::now();
+  while (!edges_.stop.load(kRelaxed)) {
+    t_next = std::max(t_next + kPeriod, transport::now());
+    std::this_thread::sleep_until(t_next);
+    take();
+    measure_errors();
+    measure_rates(transport::now());
+    log_mode();
+    publish(transport::now());
+    const std::lock_guard lock(mutex_);
+    shared_ = data_;
+  }
+}
+
+TelemetrySnapshot TelemetryLoop::snapshot() const {
+  const std::lock_guard lock(mutex_);
+  return shared_;
+}
+
+void TelemetryLoop::take() {
+  take_timings();
+  new_pose_ = edges_.pose_to_telemetry.update();
+  if ((new_fingers_ = edges_.fingers_to_telemetry.update())) {
+    fingers_ = edges_.fingers_to_telemetry.get();
+    data_.residual_now_m = fingers_.state.residual_m;
+  }
+  if ((new_arm_ = edges_.arm_to_telemetry.update())) {
+    const ArmReport& report = edges_.arm_to_telemetry.get();
+    data_.arm = report.state;
+    X_BEd_ = report.X_BEd;
+  }
+  if (edges_.mode_to_telemetry.update()) data_.mode = edges_.mode_to_telemetry.get();
+  if (edges_.hand_to_telemetry.update()) {
+    hand_report_ = edges_.hand_to_telemetry.get();
+    data_.hand = hand_report_.state;
+  }
+}
+
+void TelemetryLoop::take_timings() {
+  ArmTiming arm;
+  while (edges_.arm_timings.pop(arm)) {
+    data_.latency["decode"].add(arm.t_decoded - arm.t_arrival);
+    data_.latency["hand_pose"].add(arm.t_estimated - arm.t_decoded);
+    data_.latency["phase_wait"].add(arm.t_tick - arm.t_estimated);
+    data_.latency["arm"].add(arm.t_computed - arm.t_tick);
+    data_.latency["write"].add(arm.t_written - arm.t_computed);
+    data_.latency["total"].add(arm.t_written - arm.t_arrival);
+  }
+  FingerTiming fingers;
+  while (edges_.finger_timings.pop(fingers)) {
+    data_.latency["finger_wait"].add(fingers.t_taken - fingers.t_arrival);
+    data_.latency["fingers"].add(fingers.t_solved - fingers.t_taken);
+    for (std::size_t i = 0; i < kFingers; ++i) {
+      if (fingers.visible_markers[i] == 0) continue;
+      residual_sum_m_[i] += fingers.residual_m[i];
+      data_.residual_mean_m[i] = residual_sum_m_[i] / static_cast<double>(++residual_count_[i]);
+    }
+  }
+}
+
+void TelemetryLoop::measure_errors() {
+  if (!is_moving_mode(data_.mode.mode)) return;
+  const Pose X_BE = robot::forward_kinematics(data_.arm.q_rad);
+  data_.arm_error_m = (X_BE.translation() - X_BEd_.translation()).norm();
+  data_.arm_error_rad = math::angle_between(X_BE.linear(), X_BEd_.linear());
+  double error = 0.0;
+  for (std::size_t i = 0; i < std::min(data_.hand.joint_count, fingers_.target.joint_count); ++i) {
+    error = std::max(error, std::abs(data_.hand.q_rad[i] - fingers_.target.q_rad[i]));
+  }
+  data_.hand_error_rad = error;
+}
+
+void TelemetryLoop::measure_rates(TimePoint now) {
+  const double elapsed_s = to_seconds(now - t_rates_);
+  if (elapsed_s < 1.0) return;
+  const LoopCounters& counters = edges_.counters;
+  const std::array<std::uint64_t, 4> counts{counters.frames_received.load(kRelaxed),
+                                            counters.arm_commands.load(kRelaxed), counters.hand_commands.load(kRelaxed),
+                                            counters.finger_frames.load(kRelaxed)};
+  const std::array<double*, 4> rates{&data_.tracker_hz, &data_.arm_hz, &data_.hand_hz, &data_.fingers_hz};
+  if (t_rates_ != TimePoint{}) {
+    for (std::size_t i = 0; i < 4; ++i) *rates[i] = static_cast<double>(counts[i] - rate_counts_[i]) / elapsed_s;
+  }
+  rate_counts_ = counts;
+  t_rates_ = now;
+}
+
+void TelemetryLoop::log_mode() {
+  if (data_.mode.epoch == logged_epoch_) return;
+  logged_epoch_ = data_.mode.epoch;
+  const std::string cause = safety::to_string(data_.mode.cause);
+  const bool fault = data_.mode.mode == safety::Mode::kStopped || data_.mode.mode == safety::Mode::kHolding;
+  spdlog::log(fault ? spdlog::level::warn : spdlog::level::info, "mode {}{}{}", safety::to_string(data_.mode.mode),
+              cause.empty() ? "" : ": ", cause);
+}
+
+void TelemetryLoop::publish(TimePoint now) {
+  if (new_arm_) publish_joint_states();
+  if (new_pose_) {
+    const HandPose& pose = edges_.pose_to_telemetry.get();
+    if (pose.valid) publisher_.publish_hand_pose(pose.X_WM, "mocap", to_wall_time(pose.t_capture));
+  }
+  if (new_fingers_) publisher_.publish_hand_state(fingers_.state);
+  if (now - t_status_ > std::chrono::milliseconds(200)) {
+    publish_status();
+    t_status_ = now;
+  }
+  data_.dds_published = publisher_.counters().published;
+  data_.dds_failed = publisher_.counters().failed;
+}
+
+void TelemetryLoop::publish_joint_states() {
+  std::vector<double> q(data_.arm.q_rad.begin(), data_.arm.q_rad.end());
+  if (data_.hand.joint_count == hand_.motor_count()) {
+    const HandJointAngles angles = hand_.urdf_joint_angles({data_.hand.q_rad.data(), data_.hand.joint_count});
+    q.insert(q.end(), angles.q_rad.begin(), angles.q_rad.begin() + static_cast<std::ptrdiff_t>(angles.count));
+  }
+  const std::span<const std::string> names(joint_names_.data(), q.size());
+  publisher_.publish_joint_states(names, q, {}, to_wall_time(data_.arm.t_arrival));
+}
+
+void TelemetryLoop::publish_status() {
+  const LoopCounters& counters = edges_.counters;
+  StatusSample sample;
+  sample.stamp = to_wall_time(transport::now());
+  sample.mode = safety::to_string(data_.mode.mode);
+  sample.cause = safety::to_string(data_.mode.cause);
+  sample.epoch = data_.mode.epoch;
+  sample.counters = {{"frames_received", counters.frames_received.load(kRelaxed)},
+                     {"finger_frames", counters.finger_frames.load(kRelaxed)},
+                     {"robot_packages", counters.robot_packages.load(kRelaxed)},
+                     {"arm_commands", counters.arm_commands.load(kRelaxed)},
+                     {"hand_commands", counters.hand_commands.load(kRelaxed)},
+                     {"holds", data_.mode.holds}};
+  sample.rates = {
+      {"tracker", data_.tracker_hz}, {"arm", data_.arm_hz}, {"hand", data_.hand_hz}, {"fingers", data_.fingers_hz}};
+  for (const auto& [stage, histogram] : data_.latency) {
+    sample.latencies.push_back({stage, histogram.count(), histogram.quantile_us(0.5), histogram.quantile_us(0.99),
+                                histogram.quantile_us(0.999), histogram.max_us()});
+  }
+  publisher_.publish_status(sample);
+}
+
+}  // namespace embody

@@ -1,0 +1,76 @@
+#pragma once
+// What the real-time loops leave behind becomes statistics, log lines and DDS topics. Normal scheduling.
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "core/embodiment/embodiment_mapping.hpp"
+#include "daemon/app/histogram.hpp"
+#include "daemon/dds/publisher.hpp"
+#include "daemon/loops/edges.hpp"
+
+namespace embody {
+
+/// Statistics at one moment; a copy for whoever asks.
+struct TelemetrySnapshot {
+  safety::ModeState mode;
+  double tracker_hz{0.0};
+  double arm_hz{0.0};   ///< commands to the arm per second
+  double hand_hz{0.0};  ///< motion commands to the hand per second
+  double fingers_hz{0.0};
+  std::map<std::string, Histogram> latency;        ///< by stage
+  std::array<double, kFingers> residual_mean_m{};  ///< mean over all frames since start
+  std::array<double, kFingers> residual_now_m{};
+  double arm_error_m{0.0};  ///< measured flange to ungated target, now
+  double arm_error_rad{0.0};
+  double hand_error_rad{0.0};  ///< largest difference of a finger joint to its target, now
+  ArmState arm;
+  HandDeviceState hand;
+  std::uint64_t dds_published{0};
+  std::uint64_t dds_failed{0};
+};
+
+class TelemetryLoop {
+ public:
+  /// `hand` names and completes the hand's joints for the topics.
+  TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand);
+  /// Until edges.stop.
+  void run();
+  /// Any thread.
+  [[nodiscard]] TelemetrySnapshot snapshot() const;
+
+ private:
+  void take();
+  void take_timings();
+  void measure_errors();
+  void measure_rates(TimePoint now);
+  void log_mode();
+  void publish(TimePoint now);
+  void publish_joint_states();
+  void publish_status();
+
+  Edges& edges_;
+  DdsPublisher publisher_;
+  EmbodimentMapping hand_;
+  std::vector<std::string> joint_names_;
+
+  TelemetrySnapshot data_;
+  Pose X_BEd_{Pose::Identity()};
+  FingerReport fingers_;
+  HandReport hand_report_;
+  bool new_pose_{false};
+  bool new_fingers_{false};
+  bool new_arm_{false};
+  std::uint32_t logged_epoch_{0};
+  std::array<double, kFingers> residual_sum_m_{};
+  std::array<std::uint64_t, kFingers> residual_count_{};
+  TimePoint t_rates_{};
+  std::array<std::uint64_t, 4> rate_counts_{};
+  TimePoint t_status_{};
+
+  mutable std::mutex mutex_;
+  TelemetrySnapshot shared_;
+};
+
+}  // namespace embody

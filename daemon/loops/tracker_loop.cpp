@@ -1,0 +1,59 @@
+#include "daemon/loops/tracker_loop.hpp"
+
+#include "drivers/transport/clock.hpp"
+
+namespace embody {
+
+using transport::now;
+
+void TrackerLoop::run() noexcept {
+  while (!edges_.stop.load(std::memory_order_relaxed)) {
+    wait_for_input(baton_.fd(), -1, std::chrono::milliseconds(20));
+    edges_.heartbeats.tracker.fetch_add(1, std::memory_order_relaxed);
+    if (!baton_.with_loop()) continue;
+    if (baton_.take_revoked()) {
+      baton_.give_back();
+      continue;
+    }
+    drain();
+  }
+}
+
+/// Every buffered frame is used; the newest one is published.
+void TrackerLoop::drain() noexcept {
+  constexpr int kBurst = 64;  // bounds the time until the next heartbeat
+  bool any = false;
+  for (int i = 0; i < kBurst; ++i) {
+    const IoStatus status = baton_.driver().read(tracked_.frame);
+    if (status == IoStatus::kDisconnected) {
+      baton_.give_back();
+      break;
+    }
+    if (status != IoStatus::kDone) break;
+    use();
+    any = true;
+  }
+  if (!any) return;
+  edges_.pose_to_arm.publish(tracked_.pose);
+  edges_.frame_to_fingers.publish(tracked_);
+  edges_.fingers_wake.notify();
+  edges_.pose_to_telemetry.publish(tracked_.pose);
+}
+
+void TrackerLoop::use() noexcept {
+  const TimePoint t_decoded = now();
+  tracked_.pose = estimator_.step(tracked_.frame);
+  monitor_.step(tracked_.pose);
+  tracked_.pose.sequence = ++sequence_;
+  tracked_.pose.t_decoded = t_decoded;
+  tracked_.pose.t_estimated = now();
+  tracked_.sequence = sequence_;
+  edges_.counters.frames_received.fetch_add(1, std::memory_order_relaxed);
+  if (tracked_.pose.valid) {
+    edges_.counters.frames_used.fetch_add(1, std::memory_order_relaxed);
+  } else {
+    edges_.counters.poses_invalid.fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+}  // namespace embody

@@ -1,0 +1,37 @@
+#include "daemon/loops/watchdog_loop.hpp"
+
+#include <sys/socket.h>
+
+#include "drivers/transport/clock.hpp"
+
+namespace embody {
+
+void WatchdogLoop::run() noexcept {
+  Watch arm;
+  Watch tracker;
+  Watch hand;
+  TimePoint t_last = transport::now();
+  while (!edges_.stop.load(std::memory_order_relaxed)) {
+    wait_for_input(-1, -1, kPeriod);
+    const TimePoint t = transport::now();
+    // When this highest thread itself was late, the whole machine stood still: that says nothing about the loops.
+    if (t - t_last > 2 * kPeriod) arm = tracker = hand = {};
+    t_last = t;
+    const bool arm_hung = hung(arm, edges_.heartbeats.arm, t);
+    const bool any_hung =
+        hung(tracker, edges_.heartbeats.tracker, t) | hung(hand, edges_.heartbeats.hand, t) | arm_hung;
+    if (any_hung) edges_.watchdog_bit.store(true, std::memory_order_relaxed);
+    if (arm_hung && arm_.fd() >= 0) ::shutdown(arm_.fd(), SHUT_RDWR);
+  }
+}
+
+bool WatchdogLoop::hung(Watch& watch, const std::atomic<std::uint64_t>& heartbeat, TimePoint now) noexcept {
+  const std::uint64_t count = heartbeat.load(std::memory_order_relaxed);
+  if (count != watch.count || watch.t_progress == TimePoint{}) {
+    watch = {count, now};
+    return false;
+  }
+  return now - watch.t_progress > kLongestSilence;
+}
+
+}  // namespace embody

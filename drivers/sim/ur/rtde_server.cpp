@@ -1,0 +1,48 @@
+#include "drivers/sim/ur/rtde_server.hpp"
+
+#include <sys/socket.h>
+
+#include <algorithm>
+
+#include "drivers/transport/tcp.hpp"
+
+namespace embody::sim {
+namespace {
+
+/// The real controller's buffer holds seconds; a bounded one closes slow readers after a predictable while.
+void bound_send_buffer(int fd) noexcept {
+  const int bytes = 128 * 1024;
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+}
+
+}  // namespace
+
+Status RtdeServer::listen(const std::string& address, std::uint16_t port) {
+  auto listener = transport::tcp_listen(address, port);
+  if (!listener) return listener.error();
+  listener_ = std::move(*listener);
+  return {};
+}
+
+std::uint16_t RtdeServer::port() const noexcept {
+  return transport::local_port(listener_.get());
+}
+
+void RtdeServer::receive(std::size_t max_clients) {
+  while (transport::UniqueFd fd = transport::tcp_accept(listener_.get())) {
+    if (sessions_.size() >= max_clients) continue;
+    bound_send_buffer(fd.get());
+    sessions_.emplace_back(shared_, std::move(fd), ++shared_.counters.clients_accepted);
+  }
+  sessions_.remove_if([](RtdeSession& session) { return !session.receive(); });
+}
+
+void RtdeServer::publish(std::uint64_t previous, std::uint64_t cycle) {
+  sessions_.remove_if([=](RtdeSession& session) { return !session.publish(previous, cycle); });
+}
+
+bool RtdeServer::has_commanding_client() const noexcept {
+  return std::any_of(sessions_.begin(), sessions_.end(), [](const RtdeSession& s) { return s.commanding(); });
+}
+
+}  // namespace embody::sim

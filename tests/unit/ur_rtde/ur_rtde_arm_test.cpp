@@ -1,0 +1,441 @@
+#include "drivers/ur_rtde/ur_rtde_arm.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <numbers>
+
+#include "drivers/sim/ur/ur_controller.hpp"
+#include "tests/unit/ur_rtde/fake_controller.hpp"
+#include "tests/unit/ur_rtde/heap_counter.hpp"
+
+namespace embody {
+namespace {
+
+using sim::ProgramState;
+using sim::UrController;
+using transport::now;
+
+constexpr Duration kPatience = std::chrono::seconds(5);
+
+/// An arm driver with the loop that a daemon would run around it: one command per package.
+class Loop {
+ public:
+  explicit Loop(std::uint16_t port, Duration in_use_patience = std::chrono::seconds(4)) {
+    UrRtdeConfig config;
+    config.port = port;
+    config.in_use_patience = in_use_patience;
+    arm = std::make_unique<UrRtdeArm>(config);
+    const auto info = arm->connect();
+    connected = info.ok();
+    if (info) fd = info->fd;
+    if (!info) error = info.error();
+  }
+  /// Waits for the next package; false when the session is over or nothing comes.
+  bool next() {
+    const TimePoint deadline = now() + kPatience;
+    while (true) {
+      const IoStatus status = arm->read(state);
+      if (status == IoStatus::kDone) return true;
+      if (status == IoStatus::kDisconnected || !transport::wait_readable(fd, deadline)) return false;
+    }
+  }
+  IoStatus send(ArmAction action, const Vector6& q = Vector6::Zero(), const Vector6& qd = Vector6::Zero()) {
+    ArmCommand command;
+    command.sequence = ++sequence;
+    command.action = action;
+    command.q_rad = q;
+    command.qd_rad_s = qd;
+    command.t_expires = now() + std::chrono::milliseconds(50);
+    return arm->write(command, now());
+  }
+  /// Sends one command per package until `done` holds for the newest state.
+  template <class Done>
+  bool send_until(ArmAction action, const Vector6& q, Done done) {
+    const TimePoint deadline = now() + kPatience;
+    while (now() < deadline && next()) {
+      if (done(state)) return true;
+      send(action, q);
+    }
+    return false;
+  }
+  /// Hold, then track the present position.
+  bool engage() {
+    const auto seen = [this](const ArmState& s) { return s.echo_sequence == sequence && sequence > 0; };
+    if (!send_until(ArmAction::kHold, Vector6::Zero(), seen)) return false;
+    return send_until(ArmAction::kTrack, state.q_rad, [](const ArmState& s) { return s.tracking; });
+  }
+
+  std::unique_ptr<UrRtdeArm> arm;
+  ArmState state;
+  int fd{-1};
+  std::uint32_t sequence{0};
+  bool connected{false};
+  Error error;
+};
+
+class UrRtdeArmOnSimulator : public testing::Test {
+ protected:
+  UrRtdeArmOnSimulator() { EXPECT_TRUE(controller.start().ok()); }
+  UrController controller{sim::UrControllerConfig{}};
+  const Vector6 start = sim::UrRobotConfig{}.q_start_rad;
+};
+
+TEST_F(UrRtdeArmOnSimulator, ConnectsAndReportsAReadyRobotWithoutMovingIt) {
+  UrRtdeConfig config;
+  config.port = controller.port();
+  UrRtdeArm arm(config);
+  const auto info = arm.connect();
+  ASSERT_TRUE(info.ok()) << info.error().detail.c_str();
+  EXPECT_EQ(info->rate_hz, 500.0);
+  EXPECT_NE(info->peer.view().find("5.12.4"), std::string_view::npos) << info->peer.c_str();
+  ArmState state;
+  for (std::uint64_t package = 1; package <= 50;) {
+    ASSERT_TRUE(transport::wait_readable(info->fd, now() + kPatience));
+    while (arm.read(state) == IoStatus::kDone) {
+      EXPECT_EQ(state.package, package++);
+    }
+  }
+  EXPECT_EQ(state.condition, ArmCondition::kReady);
+  EXPECT_FALSE(state.tracking);
+  EXPECT_EQ(state.q_rad, start);
+  EXPECT_EQ(state.q_target_rad, start);
+  EXPECT_EQ(state.controller_time.count() % 2'000'000, 0) << "time stamps lie on the 2 ms grid";
+  EXPECT_LE(now() - state.t_arrival, kPatience);
+  EXPECT_TRUE(controller.has_client());
+}
+
+TEST_F(UrRtdeArmOnSimulator, TracksASineAtFiveHundredHertzWithOneCommandPerPackage) {
+  constexpr int kPackages = 1000;
+  constexpr double kAmplitude = 0.05, kOmega = std::numbers::pi;
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.connected) << loop.error.detail.c_str();
+  ASSERT_TRUE(loop.engage());
+  const sim::UrCounters before = controller.counters();
+  std::vector<std::uint32_t> lags;
+  std::vector<double> errors;
+  Duration first_time{}, last_time{};
+  for (int i = 0; i < kPackages; ++i) {
+    ASSERT_TRUE(loop.next()) << loop.arm->reason();
+    if (!loop.state.tracking) {  // the host may stall for longer than the program waits
+      ASSERT_TRUE(loop.engage());
+    }
+    if (i == 0) first_time = loop.state.controller_time;
+    last_time = loop.state.controller_time;
+    lags.push_back(loop.sequence - loop.state.echo_sequence);
+    const double t = to_seconds(loop.state.controller_time - first_time);
+    const auto wave = [&](double at) { return start + Vector6::Constant(kAmplitude * (1.0 - std::cos(kOmega * at))); };
+    errors.push_back((loop.state.q_rad - wave(std::max(0.0, t - 0.05))).cwiseAbs().maxCoeff());
+    ASSERT_EQ(loop.send(ArmAction::kTrack, wave(t), Vector6::Constant(kAmplitude * kOmega * std::sin(kOmega * t))),
+              IoStatus::kDone);
+  }
+  const sim::UrCounters after = controller.counters();
+  std::sort(lags.begin(), lags.end());
+  std::sort(errors.begin(), errors.end());
+  const double rate = (kPackages - 1) / to_seconds(last_time - first_time);
+  std::printf("packages %d at %.1f Hz, echo lag median %u p99 %u packages, error p95 %.4f rad, late cycles %llu\n",
+              kPackages, rate, lags[kPackages / 2], lags[kPackages * 99 / 100], errors[kPackages * 95 / 100],
+              static_cast<unsigned long long>(after.late_cycles - before.late_cycles));
+  EXPECT_LE(lags[kPackages / 2], 2U);
+  EXPECT_LE(lags[kPackages * 9 / 10], 3U);
+  EXPECT_LT(errors[kPackages / 2], 0.005);
+  EXPECT_GT(errors.back(), 1e-5) << "an arm without any error does not move";
+  EXPECT_EQ(after.sequence_gaps, 0U);
+  EXPECT_EQ(after.sequence_duplicates, 0U);
+  EXPECT_GE(after.command_packages - before.command_packages + 5, static_cast<std::uint64_t>(kPackages));
+}
+
+TEST_F(UrRtdeArmOnSimulator, AFrozenSenderLeavesTheProgramStaleAndTheArmStill) {
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.engage());
+  const Vector6 far = start + Vector6::Constant(1.5);
+  ASSERT_TRUE(loop.send_until(ArmAction::kTrack, far, [&](const ArmState& s) {
+    return s.qd_rad_s[0] > 0.4 && s.q_target_rad[0] < start[0] + 1.0;
+  }));
+  const auto stale = [&] { return controller.latest().program_state == ProgramState::kStale; };
+  while (!stale()) ASSERT_TRUE(loop.next());  // reads, but sends nothing any more
+  for (int i = 0; i < 400; ++i) ASSERT_TRUE(loop.next());
+  EXPECT_FALSE(loop.state.tracking);
+  EXPECT_EQ(loop.state.program_fault, 1);
+  EXPECT_LT(loop.state.qd_rad_s.cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT(loop.state.q_rad[0], far[0] - 0.2) << "it must not go on to the last target";
+
+  const auto samples = controller.samples();
+  const auto begin = std::find_if(samples.begin(), samples.end(),
+                                  [](const auto& s) { return s.program_state == ProgramState::kStale; });
+  ASSERT_NE(begin, samples.end());
+  const auto still = begin + 130;  // 1 rad/s at 4 rad/s2 is a quarter of a second
+  ASSERT_LT(still, samples.end());
+  for (auto s = still; s != samples.end(); ++s) ASSERT_EQ(s->q_target_rad, still->q_target_rad);
+}
+
+TEST_F(UrRtdeArmOnSimulator, AfterALostSessionNothingMovesBeforeHoldAndThenTrack) {
+  Loop lost(controller.port());
+  ASSERT_TRUE(lost.engage());
+  ASSERT_TRUE(lost.send_until(ArmAction::kTrack, start + Vector6::Constant(1.0),
+                              [](const ArmState& s) { return s.qd_rad_s[0] > 0.3; }));
+  controller.disconnect_clients();  // the registers keep mode 1 and the far target
+  while (lost.next()) {
+  }
+  EXPECT_EQ(lost.send(ArmAction::kTrack, start), IoStatus::kDisconnected);
+  EXPECT_FALSE(lost.arm->reason().empty());
+
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.connected) << loop.error.detail.c_str();
+  for (int i = 0; i < 400; ++i) ASSERT_TRUE(loop.next());  // comes to rest without any command
+  EXPECT_FALSE(loop.state.tracking);
+  const Vector6 rest = loop.state.q_rad;
+  loop.sequence = 1000;
+  for (int i = 0; i < 100; ++i) {  // the target of the lost session is not taken up again
+    loop.send(ArmAction::kTrack, start + Vector6::Constant(1.0));
+    ASSERT_TRUE(loop.next());
+  }
+  EXPECT_LT((loop.state.q_rad - rest).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_EQ(loop.state.program_fault, 2);
+  ASSERT_TRUE(loop.engage());
+  const Vector6 near = rest + Vector6::Constant(0.05);
+  EXPECT_TRUE(loop.send_until(ArmAction::kTrack, near,
+                              [&](const ArmState& s) { return (s.q_rad - near).cwiseAbs().maxCoeff() < 1e-3; }));
+}
+
+TEST_F(UrRtdeArmOnSimulator, ASecondClientIsToldWhoMayOwnTheRegisters) {
+  Loop owner(controller.port());
+  ASSERT_TRUE(owner.connected);
+  const TimePoint begin = now();
+  Loop second(controller.port(), std::chrono::milliseconds(300));
+  EXPECT_FALSE(second.connected);
+  EXPECT_GE(now() - begin, std::chrono::milliseconds(100)) << "it must have tried again";
+  EXPECT_EQ(second.error.code, Errc::kRefused);
+  EXPECT_NE(second.error.detail.view().find("input_int_register_24"), std::string_view::npos);
+  EXPECT_NE(second.error.detail.view().find("fieldbus"), std::string_view::npos) << second.error.detail.c_str();
+}
+
+TEST_F(UrRtdeArmOnSimulator, WaitsForRegistersThatALostSessionStillOwns) {
+  auto owner = std::make_unique<Loop>(controller.port());
+  ASSERT_TRUE(owner->connected);
+  auto second = std::async(std::launch::async, [&] { return Loop(controller.port()).connected; });
+  const TimePoint deadline = now() + kPatience;
+  while (controller.counters().clients_accepted < 2 && now() < deadline) ASSERT_TRUE(owner->next());
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(owner->next());  // long enough to be refused at least once
+  owner.reset();
+  EXPECT_TRUE(second.get());
+}
+
+TEST_F(UrRtdeArmOnSimulator, StopsOfTheRobotShowInItsCondition) {
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.engage());
+  const auto becomes = [&](ArmCondition condition) {
+    return loop.send_until(ArmAction::kHold, Vector6::Zero(),
+                           [=](const ArmState& s) { return s.condition == condition; });
+  };
+  controller.protective_stop();
+  EXPECT_TRUE(becomes(ArmCondition::kProtectiveStop));
+  EXPECT_FALSE(loop.state.tracking);
+  controller.clear_stop();
+  EXPECT_TRUE(becomes(ArmCondition::kReady));
+  controller.emergency_stop();
+  EXPECT_TRUE(becomes(ArmCondition::kEmergencyStop));
+  controller.clear_stop();
+  EXPECT_TRUE(becomes(ArmCondition::kReady));
+  controller.set_program_running(false);
+  EXPECT_TRUE(becomes(ArmCondition::kProgramStopped));
+  controller.set_program_running(true);
+  EXPECT_TRUE(becomes(ArmCondition::kReady));
+  EXPECT_TRUE(loop.engage());
+}
+
+TEST_F(UrRtdeArmOnSimulator, AFrozenControllerIsSilentAndItsFullBufferEndsTheSession) {
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.engage());
+  controller.freeze(true);
+  while (transport::wait_readable(loop.fd, now() + std::chrono::milliseconds(100))) {
+    while (loop.arm->read(loop.state) == IoStatus::kDone) {
+    }
+  }
+  EXPECT_EQ(loop.arm->read(loop.state), IoStatus::kEmpty);
+  IoStatus status = IoStatus::kDone;
+  bool dropped = false;
+  const TimePoint deadline = now() + kPatience;
+  while (status != IoStatus::kDisconnected && now() < deadline) {
+    status = loop.send(ArmAction::kTrack, start);
+    dropped = dropped || status == IoStatus::kEmpty;
+  }
+  EXPECT_TRUE(dropped);
+  EXPECT_EQ(status, IoStatus::kDisconnected);
+  EXPECT_EQ(loop.arm->reason(), "the controller stopped reading commands");
+}
+
+TEST_F(UrRtdeArmOnSimulator, RefusesCommandsThatHaveExpiredOrAreNotFinite) {
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.next());
+  ArmCommand command;
+  command.action = ArmAction::kTrack;
+  EXPECT_EQ(loop.arm->write(command, now()), IoStatus::kRefused) << "no expiry set";
+  const TimePoint t = now();
+  command.t_expires = t;
+  EXPECT_EQ(loop.arm->write(command, t + Duration(1)), IoStatus::kRefused);
+  EXPECT_EQ(loop.arm->write(command, t), IoStatus::kDone);
+  for (int i = 0; i < 6; ++i) {
+    ArmCommand bad = command;
+    bad.q_rad[i] = std::nan("");
+    EXPECT_EQ(loop.arm->write(bad, t), IoStatus::kRefused);
+    bad = command;
+    bad.qd_rad_s[i] = HUGE_VAL;
+    EXPECT_EQ(loop.arm->write(bad, t), IoStatus::kRefused);
+  }
+  const TimePoint deadline = now() + kPatience;
+  while (controller.counters().command_packages < 2 && now() < deadline) ASSERT_TRUE(loop.next());
+  EXPECT_EQ(controller.counters().command_packages, 2U) << "the greeting and the one command that was sent";
+}
+
+TEST_F(UrRtdeArmOnSimulator, ReadAndWriteDoNotTouchTheHeap) {
+  const std::uint64_t before_control = test::heap_allocations();
+  std::make_unique<int>(1).reset();
+#if !defined(EMBODY_SANITIZED)
+  ASSERT_GT(test::heap_allocations(), before_control) << "the counter must count";
+#endif
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.engage());
+  const std::uint64_t before = test::heap_allocations();
+  for (int i = 0; i < 200; ++i) {
+    const bool more = loop.next();
+    const IoStatus sent = loop.send(ArmAction::kTrack, start);
+    if (!more || sent != IoStatus::kDone) break;
+  }
+  controller.disconnect_clients();
+  while (loop.next()) {
+  }
+  loop.send(ArmAction::kTrack, start);
+  EXPECT_EQ(test::heap_allocations() - before, 0U);
+  EXPECT_GE(loop.state.package, 200U);
+}
+
+TEST_F(UrRtdeArmOnSimulator, TheDestructorLeavesModeZeroAndTheArmStill) {
+  {
+    Loop loop(controller.port());
+    ASSERT_TRUE(loop.engage());
+    ASSERT_TRUE(loop.send_until(ArmAction::kTrack, start + Vector6::Constant(1.0),
+                                [](const ArmState& s) { return s.qd_rad_s[0] > 0.3; }));
+  }
+  EXPECT_FALSE(controller.has_client());
+  const TimePoint deadline = now() + kPatience;
+  while (controller.latest().program_state != ProgramState::kHold && now() < deadline) std::this_thread::yield();
+  EXPECT_EQ(controller.latest().program_state, ProgramState::kHold) << "held, not merely stale";
+}
+
+TEST_F(UrRtdeArmOnSimulator, ConnectingAgainReleasesTheOldSession) {
+  Loop loop(controller.port());
+  ASSERT_TRUE(loop.engage());
+  const auto info = loop.arm->connect();
+  ASSERT_TRUE(info.ok()) << info.error().detail.c_str();
+  loop.fd = info->fd;
+  ASSERT_TRUE(loop.next());
+  EXPECT_EQ(loop.state.package, 1U);
+  EXPECT_TRUE(loop.engage());
+}
+
+Errc connect_error(const test::FakeController& fake, std::string* detail = nullptr) {
+  UrRtdeConfig config;
+  config.port = fake.port();
+  config.reply_timeout = std::chrono::milliseconds(200);
+  config.in_use_patience = std::chrono::milliseconds(200);
+  UrRtdeArm arm(config);
+  const auto info = arm.connect();
+  EXPECT_FALSE(info.ok());
+  if (detail != nullptr) *detail = info.error().detail.view();
+  return info.ok() ? Errc::kIo : info.error().code;
+}
+
+TEST(UrRtdeArmSetUp, NamesAVariableThatTheFirmwareDoesNotKnow) {
+  const test::FakeController fake([](char type) {
+    test::ReplyBytes reply = test::healthy_reply(type);
+    if (type != 'O') return reply;
+    std::string types(rtde::as_text(rtde::Bytes(reply).subspan(4)));
+    types.replace(types.find("INT32"), 5, "NOT_FOUND");
+    return rtde::encode_setup_reply(rtde::PackageType::kSetupOutputs, {0, types});
+  });
+  std::string detail;
+  EXPECT_EQ(connect_error(fake, &detail), Errc::kNotFound);
+  EXPECT_NE(detail.find("robot_mode"), std::string::npos) << detail;
+}
+
+TEST(UrRtdeArmSetUp, ExplainsEveryRefusalAndSilence) {
+  const auto with = [](char type, const char* reply) {
+    return [=](char asked) { return asked == type ? test::hex(reply) : test::healthy_reply(asked); };
+  };
+  EXPECT_EQ(connect_error(test::FakeController(with('V', "00 04 56 00"))), Errc::kUnsupported);
+  EXPECT_EQ(connect_error(test::FakeController(with('v', "00 04 76 00"))), Errc::kMalformed);
+  EXPECT_EQ(connect_error(test::FakeController(with('O', "00 03 4f"))), Errc::kMalformed);
+  EXPECT_EQ(connect_error(test::FakeController(with('I', "00 0a 49 01 'DOUBLE'"))), Errc::kMalformed);
+  EXPECT_EQ(connect_error(test::FakeController(with('S', "00 04 53 00"))), Errc::kRefused);
+  EXPECT_EQ(connect_error(test::FakeController(with('V', "00 01"))), Errc::kMalformed);
+  for (const char silent : {'V', 'v', 'O', 'I', 'S'}) {
+    EXPECT_EQ(connect_error(test::FakeController(with(silent, ""))), Errc::kTimeout) << silent;
+  }
+}
+
+TEST(UrRtdeArmSetUp, QuotesTheLastTextOfTheControllerInItsError) {
+  const test::FakeController fake([](char type) {
+    using test::operator+;
+    return type == 'S' ? test::hex("00 0a 4d 03 'why' 01 'd' 01") + test::hex("00 04 53 00")
+                       : test::healthy_reply(type);
+  });
+  std::string detail;
+  EXPECT_EQ(connect_error(fake, &detail), Errc::kRefused);
+  EXPECT_NE(detail.find("why"), std::string::npos) << detail;
+}
+
+TEST(UrRtdeArmSetUp, NobodyListeningIsDisconnectedAndABadFrequencyIsRefused) {
+  UrRtdeConfig config;
+  config.port = 1;
+  EXPECT_EQ(UrRtdeArm(config).connect().error().code, Errc::kDisconnected);
+  for (const double frequency : {0.0, 501.0, std::nan("")}) {
+    config.frequency_hz = frequency;
+    EXPECT_EQ(UrRtdeArm(config).connect().error().code, Errc::kInvalidArgument);
+  }
+}
+
+TEST(UrRtdeArmSetUp, ToleratesTextsStaleDataAndAnyFragmentation) {
+  for (const std::size_t part : {0U, 1U, 2U, 7U}) {
+    const test::FakeController fake(
+        [](char type) {
+          using test::operator+;
+          auto reply = test::hex("00 09 4d 02 'hi' 01 'd' 03") + test::state_package(1.0) + test::healthy_reply(type);
+          return type == 'S' ? reply + test::state_package(2.0) + test::state_package(2.002) : reply;
+        },
+        part);
+    Loop loop(fake.port());
+    ASSERT_TRUE(loop.connected) << loop.error.detail.c_str();
+    EXPECT_EQ(loop.arm->last_text(), "hi");
+    ASSERT_TRUE(loop.next());
+    EXPECT_EQ(loop.state.controller_time, std::chrono::seconds(2));
+    ASSERT_TRUE(loop.next());
+    EXPECT_EQ(loop.state.controller_time, std::chrono::milliseconds(2002));
+    EXPECT_EQ(loop.state.package, 2U);
+    EXPECT_EQ(loop.state.condition, ArmCondition::kReady);
+  }
+}
+
+TEST(UrRtdeArmStream, BytesThatBreakTheProtocolEndTheSession) {
+  using test::operator+;
+  const std::vector<test::ReplyBytes> endings{test::hex("00 02 55"), test::hex("00 05 55 01 00"),
+                                              test::state_package(std::nan("")), test::state_package(1.0, HUGE_VAL)};
+  for (const auto& ending : endings) {
+    const test::FakeController fake([&](char type) {
+      return type == 'S' ? test::healthy_reply(type) + test::state_package(1.0) + ending : test::healthy_reply(type);
+    });
+    Loop loop(fake.port());
+    ASSERT_TRUE(loop.connected);
+    EXPECT_TRUE(loop.next()) << "the good package before counts";
+    EXPECT_FALSE(loop.next());
+    EXPECT_EQ(loop.arm->read(loop.state), IoStatus::kDisconnected);
+    EXPECT_EQ(loop.send(ArmAction::kHold), IoStatus::kDisconnected);
+    EXPECT_FALSE(loop.arm->reason().empty());
+  }
+}
+
+}  // namespace
+}  // namespace embody
