@@ -15,7 +15,7 @@ using robot::kNoIndex;
 using robot::RobotModel;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kFlatCost_m2 = 1e-12;  // the cost does not depend on the angle: keep the last one
+constexpr double kFlatCost = 1e-12;  // m^2: below, the angle does not matter: keep the last one
 
 Error config_error(const char* key, const char* what) {
   return make_error(Errc::kInvalidArgument, "embodiment configuration: %s %s", key, what);
@@ -78,14 +78,14 @@ std::pair<double, double> motor_range(const HandKinematics& hand, std::size_t mo
 
 /// Maximises U cos(k r) + V sin(k r) over [lower, upper]; among equal maxima the one nearest to `last`.
 double best_angle(double U, double V, double k, double lower, double upper, double last) noexcept {
-  if (!(std::hypot(U, V) > kFlatCost_m2)) return last;
+  if (!(std::hypot(U, V) > kFlatCost)) return last;
   const double peak = std::atan2(V, U) / k, period = kTurn / k;
   double r = peak + period * std::round((last - peak) / period);
   if (r > upper) r -= period * std::ceil((r - upper) / period);
   if (r < lower) r += period * std::ceil((lower - r) / period);
   if (r <= upper) return r;
   const auto gain = [&](double x) noexcept { return U * std::cos(k * x) + V * std::sin(k * x); };
-  return gain(lower) >= gain(upper) ? lower : upper;  // between two maxima the cost has no other minimum inside
+  return gain(lower) >= gain(upper) ? lower : upper;  // without a peak inside, an end is best
 }
 
 }  // namespace

@@ -35,10 +35,8 @@ class MessageCapture final : public console_bridge::OutputHandler {
 
 /// From the first call on, console_bridge is silent in this process. Never undone, so that threads need no lock.
 void silence_console_bridge() {
-  static const bool kInstalled = [] {
-    console_bridge::useOutputHandler(new MessageCapture);  // lives as long as the process
-    return true;
-  }();
+  static MessageCapture capture;
+  static const bool kInstalled = (console_bridge::useOutputHandler(&capture), true);
   static_cast<void>(kInstalled);
 }
 

@@ -14,5 +14,7 @@ struct Command {
 
 /// status, engage, disengage, stop, reset, shutdown: the clients of the control socket.
 void add_control_commands(CLI::App& app, int& exit_code);
+/// demo: simulated lab, daemon and operator in one.
+void add_demo_command(CLI::App& app, int& exit_code);
 
 }  // namespace embody::ctl

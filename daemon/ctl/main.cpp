@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::array kCommands{
     embody::ctl::Command{&embody::ctl::add_control_commands},
+    embody::ctl::Command{&embody::ctl::add_demo_command},
 };
 
 constexpr const char* kFooter =

@@ -50,6 +50,9 @@ Status check_setup(const Parameters& parameters, const std::vector<std::string>&
 
 Result<Parameters> ask_parameters(RtConnection& control, std::string_view command, TimePoint deadline) {
   const auto xml = control.ask(command, PacketType::kXml, deadline);
+  if (!xml && xml.error().code == Errc::kRefused) {
+    return make_error(Errc::kRefused, "%s; start a measurement in QTM", xml.error().detail.c_str());
+  }
   if (!xml) return xml.error();
   return parse_parameters(*xml);
 }

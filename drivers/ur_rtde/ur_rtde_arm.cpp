@@ -1,5 +1,7 @@
 #include "drivers/ur_rtde/ur_rtde_arm.hpp"
 
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -26,10 +28,10 @@ double package_rate_hz(double control_hz, double wanted_hz) noexcept {
   return control_hz / std::max(1.0, std::floor(control_hz / wanted_hz));
 }
 
-/// A short send buffer: when the controller stops reading, old commands must not pile up in the kernel.
-void limit_send_buffer(int fd) noexcept {
-  const int bytes = 16 * 1024;
-  ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+/// Bytes handed to our kernel that the controller's kernel has not acknowledged yet.
+int unacknowledged_bytes(int fd) noexcept {
+  int bytes = 0;
+  return ::ioctl(fd, SIOCOUTQ, &bytes) == 0 ? bytes : 0;
 }
 
 }  // namespace
@@ -52,7 +54,6 @@ Result<ArmInfo> UrRtdeArm::connect() {
   auto fd = transport::tcp_connect(config_.host, config_.port, start + config_.reply_timeout);
   if (!fd) return fd.error();
   fd_ = std::move(*fd);
-  limit_send_buffer(fd_.get());
   buffer_.clear();
 
   const auto version = negotiate(deadline);
@@ -213,13 +214,16 @@ IoStatus UrRtdeArm::read(ArmState& state) noexcept {
   return IoStatus::kDisconnected;
 }
 
+// The newest command wins: after an interruption the controller must not find a pile of old ones.
 IoStatus UrRtdeArm::write(const ArmCommand& command, TimePoint now) noexcept {
+  constexpr int kMostUnacknowledged = 4096;  // 38 commands, 76 ms at 500 Hz
   if (!streaming_) return IoStatus::kDisconnected;
   if (now > command.t_expires) return IoStatus::kRefused;
   const bool finite = command.q_rad.allFinite() && command.qd_rad_s.allFinite();
   if (command.action == ArmAction::kTrack && !finite) return IoStatus::kRefused;
   rtde::encode_command(command, input_recipe_, package_);
-  const IoStatus status = transport::send_message(fd_.get(), package_);
+  const bool backlog = unacknowledged_bytes(fd_.get()) > kMostUnacknowledged;
+  const IoStatus status = backlog ? IoStatus::kEmpty : transport::send_message(fd_.get(), package_);
   if (status == IoStatus::kDisconnected) return end_session("the controller closed the connection");
   if (status == IoStatus::kDone) {
     last_sequence_ = command.sequence & rtde::kSequenceMask;
@@ -227,7 +231,7 @@ IoStatus UrRtdeArm::write(const ArmCommand& command, TimePoint now) noexcept {
     return status;
   }
   if (blocked_since_ == TimePoint{}) blocked_since_ = now;
-  if (now - blocked_since_ > config_.backlog_limit) return end_session("the controller stopped reading commands");
+  if (now - blocked_since_ > config_.backlog_limit) return end_session("commands do not reach the controller any more");
   return status;
 }
 

@@ -25,8 +25,8 @@ struct UrRtdeConfig {
   Duration reply_timeout{std::chrono::seconds(1)};
   /// How long registers may stay owned by somebody else (a lost session of ours, for instance) before connect() fails.
   Duration in_use_patience{std::chrono::seconds(4)};
-  /// A send buffer that stays full for longer ends the session.
-  Duration backlog_limit{std::chrono::milliseconds(50)};
+  /// How long commands may fail to get through (they are dropped meanwhile) before write() ends the session.
+  Duration backlog_limit{std::chrono::milliseconds(100)};
 };
 
 class UrRtdeArm : public ArmDriver {
@@ -45,7 +45,8 @@ class UrRtdeArm : public ArmDriver {
   /// session.
   IoStatus read(ArmState& state) noexcept override;
 
-  /// One package, in one send(). kRefused when the command has expired, or tracks a target that is not finite.
+  /// One package, in one send(). kEmpty while more than 4 kB of commands are on the way. kRefused when the
+  /// command has expired, or tracks a target that is not finite.
   IoStatus write(const ArmCommand& command, TimePoint now) noexcept override;
 
   /// Why the last session ended, for people; empty while it lasts.

@@ -9,10 +9,13 @@
 namespace embody::sim {
 namespace {
 
-/// The real controller's buffer holds seconds; a bounded one closes slow readers after a predictable while.
-void bound_send_buffer(int fd) noexcept {
-  const int bytes = 128 * 1024;
-  ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+/// The real controller's buffers hold seconds; bounded ones close slow readers, and stop a flood of inputs, after a
+/// predictable while.
+void bound_buffers(int fd) noexcept {
+  const int send_bytes = 128 * 1024;
+  const int receive_bytes = 32 * 1024;
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &send_bytes, sizeof send_bytes);
+  ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &receive_bytes, sizeof receive_bytes);
 }
 
 }  // namespace
@@ -31,7 +34,7 @@ std::uint16_t RtdeServer::port() const noexcept {
 void RtdeServer::receive(std::size_t max_clients) {
   while (transport::UniqueFd fd = transport::tcp_accept(listener_.get())) {
     if (sessions_.size() >= max_clients) continue;
-    bound_send_buffer(fd.get());
+    bound_buffers(fd.get());
     sessions_.emplace_back(shared_, std::move(fd), ++shared_.counters.clients_accepted);
   }
   sessions_.remove_if([](RtdeSession& session) { return !session.receive(); });

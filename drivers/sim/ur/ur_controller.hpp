@@ -24,12 +24,12 @@ struct UrControllerConfig {
 
 /// The robot after one control cycle.
 struct UrSample {
-  TimePoint t{};                          ///< planned time of the cycle
-  std::uint64_t cycle{0};                 ///< timestamp = cycle / frequency_hz
-  Vector6 q_rad{Vector6::Zero()};         ///< actual
-  Vector6 qd_rad_s{Vector6::Zero()};      ///< actual
-  Vector6 q_target_rad{Vector6::Zero()};  ///< set-point of the control program
-  ProgramState program_state{ProgramState::kBoot};
+  TimePoint t{};                                    ///< planned time of the cycle
+  std::uint64_t cycle{0};                           ///< timestamp = cycle / frequency_hz
+  Vector6 q_rad{Vector6::Zero()};                   ///< actual
+  Vector6 qd_rad_s{Vector6::Zero()};                ///< actual
+  Vector6 q_target_rad{Vector6::Zero()};            ///< set-point of the control program
+  ProgramState program_state{ProgramState::kBoot};  ///< a stopped program leaves its last one
 };
 
 struct UrCounters : RtdeCounters {

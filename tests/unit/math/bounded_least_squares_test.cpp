@@ -15,9 +15,8 @@ constexpr int kN = 6, kM = 9;
 using Model = LeastSquaresModel<kN, kM>;
 using Vector = Model::Variables;
 
-// With costs of order 1 and curvatures of order 1, a gradient below about sqrt(4 eps) no longer changes the cost's
-// digits.
-constexpr double kRounding = 1e-7;
+// With costs and curvatures of order 10, a gradient below sqrt(4 eps 10 10) = 3e-7 no longer changes the cost's digits.
+constexpr double kRounding = 1e-6;
 
 // r_k(x) = a_k . x + sin(c_k . x) * s - b_k: curved, but for s << 1 with a single minimum in the box.
 struct Problem {

@@ -117,7 +117,7 @@ ScriptedPeer::Script sound_script(std::vector<std::string> labels, ScriptedPeer:
             "<Q><General><Frequency>100</Frequency></General><The_3D><AxisUpwards>+Z</AxisUpwards>"
             "<CalibrationTime>2021</CalibrationTime><Labels>" +
             std::to_string(labels.size()) + "</Labels>";
-        for (const auto& label : labels) xml += "<Label><Name>" + label + "</Name></Label>";
+        for (const auto& label : labels) xml += "<Label><Name><![CDATA[" + label + "]]></Name></Label>";
         return {qualisys::encode_text(PacketType::kXml, xml + "</The_3D></Q>")};
       };
 }

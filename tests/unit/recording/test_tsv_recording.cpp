@@ -196,10 +196,22 @@ TEST(TsvRecording, NamesEachDefectWithFileLineAndColumn) {
   }
 }
 
-TEST(TsvRecording, RefusesEveryTruncationOfAnExport) {
+TEST(TsvRecording, NeverTakesACutExportForSomethingElse) {
+  // Ends in a missing marker: a cut that only takes away the last `nan` changes nothing and may pass.
   const std::string text = Export{}.text();
-  for (std::size_t size = 0; size + 1 < text.size(); ++size) {
-    EXPECT_FALSE(parse_tsv(text.substr(0, size), "trial.tsv").ok()) << "cut behind byte " << size;
+  std::size_t passed = 0;
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    const auto recording = parse_tsv(text.substr(0, size), "trial.tsv");
+    if (!recording) continue;
+    ++passed;
+    expect_the_example(*recording);
+    EXPECT_GE(size + 4, text.size()) << "cut behind byte " << size;
+  }
+  EXPECT_LE(passed, 2U);
+  std::string visible = Export{}.text();
+  visible = replace_all(visible, "nan\tnan\tnan", "1.250\t2.250\t3.250");
+  for (std::size_t size = 0; size + 1 < visible.size(); ++size) {
+    EXPECT_FALSE(parse_tsv(visible.substr(0, size), "trial.tsv").ok()) << "cut behind byte " << size;
   }
 }
 

@@ -199,6 +199,47 @@ TEST(UrControllerConfiguration, ValuesThatCannotWorkAreRefused) {
   EXPECT_FALSE(UrController(config).start());
 }
 
+/// A session over a socket pair, without a controller around it.
+struct PairedSession {
+  explicit PairedSession(RtdeShared& shared, std::uint64_t id) {
+    std::array<int, 2> pair{};
+    EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair.data()), 0);
+    peer.reset(pair[0]);
+    session.emplace(shared, transport::UniqueFd(pair[1]), id);
+  }
+  bool send(const std::vector<std::byte>& package) {
+    EXPECT_EQ(transport::send_message(peer.get(), package), IoStatus::kDone);
+    return session->receive();
+  }
+  std::size_t drain() {
+    std::vector<std::byte> sink(1 << 16);
+    std::size_t size = 0;
+    for (auto got = transport::receive(peer.get(), sink); got.size > 0; got = transport::receive(peer.get(), sink)) {
+      size += got.size;
+    }
+    return size;
+  }
+  transport::UniqueFd peer;
+  std::optional<RtdeSession> session;
+};
+
+TEST(RtdeSession, SkipsLatePackagesInsteadOfQueuingThem) {
+  RtdeShared shared;
+  PairedSession pair(shared, 1);
+  ASSERT_TRUE(pair.send(hex("00 05 56 00 02")));
+  ASSERT_TRUE(pair.send(rtde::encode_outputs_request(125.0, "timestamp")));  // one package each 4 cycles
+  ASSERT_TRUE(pair.send(kStart));
+  pair.drain();
+  const auto sent = [&](std::uint64_t previous, std::uint64_t cycle) {
+    EXPECT_TRUE(pair.session->publish(previous, cycle));
+    return pair.drain() / (rtde::kFieldsStart + sizeof(double));
+  };
+  EXPECT_EQ(sent(2, 3), 0U);
+  EXPECT_EQ(sent(3, 4), 1U);
+  EXPECT_EQ(sent(4, 7), 0U);
+  EXPECT_EQ(sent(7, 100), 1U);
+}
+
 /// Random packages, many of them almost right, straight into a session over a socket pair.
 TEST(RtdeSession, SurvivesRandomPackagesWithBoundedMemory) {
   std::mt19937_64 random(11);
@@ -213,20 +254,14 @@ TEST(RtdeSession, SurvivesRandomPackagesWithBoundedMemory) {
   RtdeShared shared;
   std::uint64_t id = 0;
   std::size_t packages = 0;
-  std::vector<std::byte> sink(1 << 16);
   while (packages < 100'000) {
-    std::array<int, 2> pair{};
-    ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair.data()), 0);
-    const transport::UniqueFd peer(pair[0]);
-    RtdeSession session(shared, transport::UniqueFd(pair[1]), ++id);
+    PairedSession pair(shared, ++id);
     bool open = true;
     for (int i = 0; open && i < 2000; ++i, ++packages) {
       auto package = seeds[random() % seeds.size()];
       if (random() % 4 == 0) package[random() % package.size()] = static_cast<std::byte>(random());
-      ASSERT_EQ(::send(peer.get(), package.data(), package.size(), MSG_NOSIGNAL), static_cast<ssize_t>(package.size()));
-      open = session.receive() && session.publish(id, id + 1);
-      while (::recv(peer.get(), sink.data(), sink.size(), 0) > 0) {
-      }
+      open = pair.send(package) && pair.session->publish(id, id + 1);
+      pair.drain();
     }
   }
   EXPECT_GT(id, 20U) << "the damage must end sessions now and then";
