@@ -64,11 +64,12 @@ namespace detail {
 /// definite.
 template <class Square, class Variables>
 [[nodiscard]] bool box_newton_step(const Square& A, const Variables& g, const Variables& x, const Variables& lower,
-                                   const Variables& upper, Variables& step) noexcept {
+                                   const Variables& upper, Variables& x_new) noexcept {
   const Eigen::Index n = x.size();
   auto fixed =
       ((x.array() <= lower.array() && g.array() > 0.0) || (x.array() >= upper.array() && g.array() < 0.0)).eval();
-  step = Variables::Zero(n);
+  Variables step = Variables::Zero(n);  // of the fixed variables
+  x_new = x;
   for (Eigen::Index pass = 0; pass <= n; ++pass) {
     Square reduced = A;
     Variables b = -g - A.lazyProduct(step);
@@ -84,17 +85,16 @@ template <class Square, class Variables>
     const Variables s = factor.solve(b);
     bool inside = true;
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double bounded = std::clamp(s(i), lower(i) - x(i), upper(i) - x(i));
-      if (fixed(i) || bounded == s(i)) continue;
+      if (fixed(i)) continue;
+      x_new(i) = std::clamp(x(i) + s(i), lower(i), upper(i));
+      if (x(i) + s(i) == x_new(i)) continue;
       fixed(i) = true;
-      step(i) = bounded;
+      step(i) = x_new(i) - x(i);
       inside = false;
     }
-    if (!inside) continue;
-    step = s;
-    return true;
+    if (inside) return true;
   }
-  return true;  // unreachable: every pass fixes a variable or returns
+  return true;  // not reached: every pass fixes a variable or returns
 }
 
 }  // namespace detail
@@ -152,14 +152,13 @@ template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
     Square A = hessian;
     const double floor = 1e-12 * (1e-12 + gauss_newton.diagonal().maxCoeff());
     A.diagonal().array() += damping * (gauss_newton.diagonal().array() + floor);
-    Variables step;
-    if (!detail::box_newton_step(A, g, result.x, lower, upper, step)) {  // indefinite curvature
+    Variables x_trial;
+    if (!detail::box_newton_step(A, g, result.x, lower, upper, x_trial)) {  // indefinite curvature
       raise_damping();
       if (damping > kMostDamping) hessian = gauss_newton;
       continue;
     }
-    const Variables x_trial = (result.x + step).cwiseMax(lower).cwiseMin(upper);
-    step = x_trial - result.x;
+    const Variables step = x_trial - result.x;
     const double predicted = -2.0 * g.dot(step) - step.dot(hessian.lazyProduct(step).eval());
     const double cost_trial = evaluate_at(x_trial);
     if (!(cost_trial < result.cost)) {

@@ -38,8 +38,15 @@ std::string place(const Source& source, const toml::source_region& region) {
   return region.begin.line == 0 ? source.name : source.name + ":" + std::to_string(region.begin.line);
 }
 
+/// toml++ bounds the nesting of values but not of dotted keys, and recurses into them: a.a.a... can exhaust the stack.
+constexpr std::ptrdiff_t kMaxDots = 4096;
+
 /// Parses TOML text. On failure adds a problem with line and column and returns an empty table.
 toml::table parse_text(std::string_view text, const Source& source, Load& load) {
+  if (std::count(text.begin(), text.end(), '.') > kMaxDots) {
+    load.problems.push_back({source.name, "more than 4096 dots: this is no configuration file"});
+    return {};
+  }
   try {
     return toml::parse(text, std::string_view(source.name));
   } catch (const toml::parse_error& error) {

@@ -104,7 +104,7 @@ Daemon::Daemon(const config::EmbodyConfig& config, Models models, std::unique_pt
       hand_baton_(*hand_),
       tracker_loop_(tracker_baton_, models.hand_pose, edges_),
       finger_loop_(models.fingers, models.embodiment,
-                   {config.record_mapping.slow_down, config.record_mapping.slow_down_spins}, edges_),
+                   SlowDown{config.record_mapping.slow_down, config.record_mapping.slow_down_spins}, edges_),
       arm_loop_(arm_baton_, tracker_baton_, models.arm, mode_config(config.safety), arm_loop_config(config), edges_),
       hand_loop_(hand_baton_, hand_gate_config(config), {from_seconds(1.0 / config.hand.rate_hz)}, edges_),
       watchdog_loop_(arm_baton_, edges_),

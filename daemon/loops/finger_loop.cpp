@@ -1,5 +1,7 @@
 #include "daemon/loops/finger_loop.hpp"
 
+#include <algorithm>
+#include <cstdlib>
 #include <ctime>
 
 #include "drivers/transport/clock.hpp"
@@ -38,9 +40,10 @@ void FingerLoop::use(const TrackedFrame& tracked) noexcept {
 }
 
 void FingerLoop::slow_down(TimePoint t_start) const noexcept {
-  if (config_.slow_down == Duration{0}) return;
-  const TimePoint t_end = t_start + config_.slow_down;
-  if (config_.slow_down_spins) {
+  const Duration::rep setting = slow_down_ns_.load(std::memory_order_relaxed);
+  if (setting == 0) return;
+  const TimePoint t_end = t_start + Duration{std::abs(setting)};
+  if (setting < 0) {
     while (now() < t_end) {
     }
     return;

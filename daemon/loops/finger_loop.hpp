@@ -6,18 +6,25 @@
 
 namespace embody {
 
-struct FingerLoopConfig {
-  Duration slow_down{0};  ///< diagnosis: extra time per frame
-  bool slow_down_spins{false};
+/// Diagnosis: extra time per frame, to show that the arm does not depend on this loop.
+struct SlowDown {
+  Duration time{0};
+  bool spins{false};  ///< compute instead of sleep
 };
 
 class FingerLoop {
  public:
-  FingerLoop(const hand::FingerEstimator& estimator, const EmbodimentMapping& mapping, const FingerLoopConfig& config,
+  FingerLoop(const hand::FingerEstimator& estimator, const EmbodimentMapping& mapping, const SlowDown& slow_down,
              Edges& edges)
-      : estimator_(estimator), mapping_(mapping), config_(config), edges_(edges) {}
+      : estimator_(estimator), mapping_(mapping), edges_(edges) {
+    set_slow_down(slow_down);
+  }
   /// Until edges.stop. No heap, lock, log or exception.
   void run() noexcept;
+  /// Any thread.
+  void set_slow_down(const SlowDown& slow_down) noexcept {
+    slow_down_ns_.store(slow_down.spins ? -slow_down.time.count() : slow_down.time.count(), std::memory_order_relaxed);
+  }
 
  private:
   static constexpr Duration kDutyWindow = std::chrono::milliseconds(100);
@@ -28,7 +35,7 @@ class FingerLoop {
 
   hand::FingerEstimator estimator_;
   EmbodimentMapping mapping_;
-  FingerLoopConfig config_;
+  std::atomic<Duration::rep> slow_down_ns_{0};  // negative: spin
   Edges& edges_;
   FingerReport report_;
   std::uint64_t last_sequence_{0};

@@ -130,6 +130,7 @@ std::string Lab::report_json() const {
   const std::vector<SentFrame> sent = qtm_.log();
   const FollowReport report = judge(ungated_targets(models_, recording_, sent), ur_.samples(), mia_.log());
   const UrCounters ur = ur_.counters();
+  const UrSample arm = ur_.latest();
   const MiaSimulatorCounters mia = mia_.counters();
   const nlohmann::json json{{"followed", report.followed},
                             {"reason", report.reason},
@@ -145,6 +146,11 @@ std::string Lab::report_json() const {
                             {"largest_joint_speed_rad_s", report.largest_joint_speed_rad_s},
                             {"frames_sent", sent.size()},
                             {"frames_in_recording", recording_.frames.size()},
+                            {"arm_now",
+                             {{"q_rad", std::vector<double>(arm.q_rad.begin(), arm.q_rad.end())},
+                              {"speed_rad_s", arm.qd_rad_s.cwiseAbs().maxCoeff()},
+                              {"tracking", arm.program_state == ProgramState::kTracking}}},
+                            {"hand_now", {{"q_rad", mia_.joint_angles_rad()}}},
                             {"ur",
                              {{"packages_sent", ur.packages_sent},
                               {"command_packages", ur.command_packages},

@@ -7,7 +7,11 @@ namespace embody::recording::tsv {
 inline constexpr double kMetresPerMillimetre = 1e-3;
 /// Coordinates beyond this are no measurement (10 km).
 inline constexpr double kMaxCoordinate_mm = 1e7;
-inline constexpr double kMaxRate_hz = 1e5;
+
+/// Frame rates outside of 0.001 to 100,000 Hz are no measurement, nor is NaN.
+constexpr bool is_rate(double rate_hz) noexcept {
+  return rate_hz >= 1e-3 && rate_hz <= 1e5;
+}
 
 inline constexpr std::string_view kFrames = "NO_OF_FRAMES";
 inline constexpr std::string_view kMarkers = "NO_OF_MARKERS";

@@ -153,7 +153,7 @@ class Parser {
     if (key == tsv::kTimeStamp && recording_.time_stamp.empty()) recording_.time_stamp = value;
     if (key != tsv::kFrequency || value == "EXT") return {};
     auto& rate_hz = recording_.rate_hz;
-    if (parse_number(value, rate_hz) && rate_hz > 0.0 && rate_hz <= tsv::kMaxRate_hz) return {};
+    if (parse_number(value, rate_hz) && tsv::is_rate(rate_hz)) return {};
     return at_line(Errc::kMalformed, "FREQUENCY " + quoted(value) + " is not a rate in hertz; correct it");
   }
 
@@ -329,7 +329,7 @@ class Parser {
     if (recording_.rate_hz > 0.0) return {};
     const double span_s = last_time_s_ - first_time_s_;
     const double rate_hz = static_cast<double>(recording_.frames.size() - 1) / span_s;
-    if (!time_column_ || !(rate_hz > 0.0 && rate_hz <= tsv::kMaxRate_hz)) {
+    if (!time_column_ || !tsv::is_rate(rate_hz)) {
       return at_file(Errc::kMalformed, "neither FREQUENCY nor the Time column tells the rate; add a FREQUENCY line");
     }
     recording_.rate_hz = rate_hz;

@@ -47,7 +47,7 @@ Status check_names(const std::vector<std::string>& names) {
 
 Status check(const Recording& recording) {
   if (auto status = check_names(recording.marker_names); !status) return status;
-  if (!(recording.rate_hz > 0.0 && recording.rate_hz <= tsv::kMaxRate_hz)) {
+  if (!tsv::is_rate(recording.rate_hz)) {
     return make_error(Errc::kInvalidArgument, "cannot write a recording at a rate of %g Hz", recording.rate_hz);
   }
   if (!is_writable_text(recording.time_stamp)) {

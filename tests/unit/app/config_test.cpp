@@ -206,6 +206,17 @@ TEST(Config, MessagesFitAndKeepTheFileNameWhateverTheInput) {
   EXPECT_EQ(text.rfind("embody.toml:3: unknown key 'kkkk", 0), 0u) << text;
 }
 
+TEST(Config, DeepNestingIsRefusedBeforeItExhaustsTheStack) {
+  const auto dotted = [](int count) {
+    std::string text = "a";
+    for (int i = 0; i < count; ++i) text += ".a";
+    return text;
+  };
+  EXPECT_NE(message(dotted(30'000) + " = 1\n").find("more than 4096 dots"), std::string::npos);
+  EXPECT_NE(message("[" + dotted(4000) + "]\n").find("unknown key 'a'"), std::string::npos);
+  EXPECT_EQ(message("a = " + std::string(50'000, '[')).rfind("embody.toml:2:", 0), 0u);
+}
+
 TEST_F(ConfigFiles, AnIncludedFileIsFoundBesideTheFileThatNamesIt) {
   write("gloves/mine.toml",
         "names = [\"a\", \"b\", \"c\"]\nfinger_markers = []\nback = {top = \"a\", left = \"b\", "

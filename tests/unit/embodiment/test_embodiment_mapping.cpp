@@ -115,7 +115,7 @@ void expect_never_worse_than_a_grid(const EmbodimentConfig& config, const robot:
   EmbodimentMapping mapping = make(config, model);
   RandomHand random_hand(mapping, seed);
   FingerTarget target;
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 50; ++i) {
     const Points p_P = random_hand.points(noise_m);
     mapping.step(state_of(mapping, p_P), target);
     ASSERT_TRUE(target.valid);
@@ -125,8 +125,8 @@ void expect_never_worse_than_a_grid(const EmbodimentConfig& config, const robot:
       ASSERT_GE(r[m], mapping.lower_rad(m));
       ASSERT_LE(r[m], mapping.upper_rad(m));
       std::vector<double> other = r;  // the motors are independent: one after the other is enough
-      for (int k = 0; k <= 200; ++k) {
-        other[m] = mapping.lower_rad(m) + k / 200.0 * (mapping.upper_rad(m) - mapping.lower_rad(m));
+      for (int k = 0; k <= 100; ++k) {
+        other[m] = mapping.lower_rad(m) + k / 100.0 * (mapping.upper_rad(m) - mapping.lower_rad(m));
         ASSERT_LE(best, cost(mapping, config, p_P, other) + 1e-12) << "hand " << i << ", motor " << m;
       }
     }

@@ -120,7 +120,7 @@ TEST(FingerEstimator, AgreesWithSlsqpOnThePapersObjective) {
             }
             return 1e6 * at(here);  // mm^2: SLSQP's internal tolerances are absolute
           },
-          const_cast<Cost*>(&cost));
+          const_cast<void*>(static_cast<const void*>(&cost)));
       reference.set_xtol_rel(1e-10);
       reference.set_maxeval(2'000);
       const Vector9 start = angles(before, f);

@@ -151,6 +151,12 @@ std::vector<Defect> defects() {
   add("rate no number", [](Export& f) { f.rate = "FREQUENCY\tfast\n"; }, {":3", "'fast'"});
   add("rate zero", [](Export& f) { f.rate = "FREQUENCY\t0\n"; }, {":3", "FREQUENCY"});
   add("rate nan", [](Export& f) { f.rate = "FREQUENCY\tnan\n"; }, {":3", "FREQUENCY"});
+  add("times beyond any clock",
+      [](Export& f) {
+        f.rate = "FREQUENCY\tEXT\n";
+        f.second = replace_all(f.second, "0.01000", "1e200");
+      },
+      {"FREQUENCY"});
   add("another kind of file", [](Export& f) { f.frames = "{\"json\": 1}\n"; }, {":1", "neither"});
   add("column missing", [](Export& f) { f.columns = replace_all(f.columns, "\thand_top Y", ""); },
       {":6", "'hand_top Y'"});
