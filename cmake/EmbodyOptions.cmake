@@ -24,5 +24,5 @@ endif()
 
 add_library(embody_warnings INTERFACE)
 target_compile_options(embody_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
+  -Wall -Wextra -Wno-missing-field-initializers -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
   $<$<BOOL:${EMBODY_WERROR}>:-Werror>)

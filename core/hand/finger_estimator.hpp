@@ -13,7 +13,7 @@ struct FingerEstimatorConfig {
   PerFinger upper_rad;     ///< default +0.4 pi
   PerFinger weight_plus;   ///< m/rad: cost of a positive angle q is (w q)^2
   PerFinger weight_minus;  ///< m/rad: cost of a negative angle
-  int max_iterations{100};
+  int max_iterations{50};
   double tolerance{1e-9};  ///< first-order optimality of half the cost in the box, m^2/rad
 
   /// Bounds and action weights of Fabisch et al. 2022 (published configuration 20211105_april).

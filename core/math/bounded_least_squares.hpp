@@ -149,14 +149,21 @@ template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
     result.status = LeastSquaresStatus::kCapped;
     if (result.iterations >= options.max_iterations) return result;
 
-    Square A = hessian;
-    const double floor = 1e-12 * (1e-12 + gauss_newton.diagonal().maxCoeff());
-    A.diagonal().array() += damping * (gauss_newton.diagonal().array() + floor);
-    Variables x_trial;
-    if (!detail::box_newton_step(A, g, result.x, lower, upper, x_trial)) {  // indefinite curvature
+    Variables x_trial = result.x;
+    const auto solve_damped = [&]() noexcept {
+      Square A = hessian;
+      const double floor = 1e-12 * (1e-12 + gauss_newton.diagonal().maxCoeff());
+      A.diagonal().array() += damping * (gauss_newton.diagonal().array() + floor);
+      return detail::box_newton_step(A, g, result.x, lower, upper, x_trial);
+    };
+    bool solved = solve_damped();
+    if (!solved) {  // indefinite curvature: Gauss-Newton
+      hessian = gauss_newton;
+      solved = solve_damped();
+    }
+    while (!solved && damping <= kMostDamping) {
       raise_damping();
-      if (damping > kMostDamping) hessian = gauss_newton;
-      continue;
+      solved = solve_damped();
     }
     const Variables step = x_trial - result.x;
     const double predicted = -2.0 * g.dot(step) - step.dot(hessian.lazyProduct(step).eval());

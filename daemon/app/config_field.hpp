@@ -14,8 +14,14 @@
 // Nothing else defines a key: parsing, printing and documentation are three visitors. A struct may also have
 //   std::string problem() const            why the values do not fit together, or ""
 // Key names end in their unit (`speed_m_s`); chrono members hold what the unit of their key says.
+#include <chrono>
 
 namespace embody::config {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+inline constexpr double kPi = 3.14159265358979323846;
 
 /// Inclusive bounds of a number, in the unit of its key.
 struct Range {
