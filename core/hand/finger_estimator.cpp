@@ -101,8 +101,9 @@ void FingerEstimator::solve(std::size_t finger, const std::array<const Marker*, 
   // An angle that no visible marker depends on keeps its value instead of falling back to zero.
   Vector9 lower = config_.lower_rad[finger];
   Vector9 upper = config_.upper_rad[finger];
-  for (Eigen::Index i = 3 * static_cast<Eigen::Index>(observed_joints); i < 9; ++i)
+  for (Eigen::Index i = 3 * static_cast<Eigen::Index>(observed_joints); i < 9; ++i) {
     lower(i) = upper(i) = q_rad_[finger](i);
+  }
   const auto solution = math::solve_bounded_least_squares<9, 15>(evaluate, q_rad_[finger], lower, upper,
                                                                  {config_.max_iterations, config_.tolerance});
   iterations_[finger] = solution.iterations;

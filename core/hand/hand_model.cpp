@@ -12,7 +12,9 @@ using Eigen::Vector3d;
 
 // Wrist (root joint) in M: MANO's origin lies near the knuckle of the middle finger. With this offset, calibrated
 // transforms X_HM and X_PM made for MANO hold for this model.
-const Vector3d kWrist_M{0.0957, 0.0064, 0.0062};
+Vector3d wrist_M() noexcept {
+  return {0.0957, 0.0064, 0.0062};
+}
 
 // First, second, third joint and fleshy tip of each finger (by Finger) in the flat hand, from the wrist, m.
 using FingerPoints = std::array<std::array<Vector3d, 4>, kFingers>;
@@ -48,12 +50,12 @@ HandModel::HandModel(const HandModelConfig& config) noexcept {
   const double scale = factor(config, HandShape::kScale);
   const double girth = factor(config, HandShape::kGirth);
   const Vector3d palm(factor(config, HandShape::kPalmLength), girth, factor(config, HandShape::kPalmBreadth));
-  joints_[0] = kWrist_M;
+  joints_[0] = wrist_M();
   for (std::size_t f = 0; f < kFingers; ++f) {
     const std::size_t first = first_joint(static_cast<Finger>(f));
     const double length = factor(config, length_of(f));
     const std::array<double, 3> stretch{length, length, length * factor(config, HandShape::kDistalLength)};
-    joints_[first] = kWrist_M + scale * reference[f][0].cwiseProduct(palm);
+    joints_[first] = joints_[0] + scale * reference[f][0].cwiseProduct(palm);
     for (std::size_t level = 0; level < 3; ++level) {
       const Vector3d end =
           joints_[first + level] + scale * stretch[level] * (reference[f][level + 1] - reference[f][level]);
@@ -63,7 +65,7 @@ HandModel::HandModel(const HandModelConfig& config) noexcept {
       const MarkerAttachment& given = config.attachments[f][point];
       const std::size_t level = std::clamp(given.joint, first, first + 2) - first;
       const Vector3d bone = (reference[f][level + 1] - reference[f][level]).normalized();
-      const Vector3d p = given.p_rest_M - kWrist_M - reference[f][level];
+      const Vector3d p = given.p_rest_M - joints_[0] - reference[f][level];
       const Vector3d along = p.dot(bone) * bone;
       attachments_[f][point] = {level, scale * (stretch[level] * along + girth * (p - along))};
     }

@@ -160,12 +160,14 @@ std::string status_table(const std::string& json_text) {
   add_devices(table, member(status, "devices"));
   table.pairs("rates", member(status, "rates_hz"), " Hz");
   table.pairs("residuals", member(status, "marker_residual_mm"), " mm");
+  table.pairs("tracking", member(status, "tracking"), "");
   add_latency(table, member(status, "latency_us"));
   add_realtime(table, member(status, "realtime"));
   table.pairs("counters", member(status, "counters"), "");
 
-  static const std::set<std::string> kKnown{"version",  "uptime_s",   "mode",     "devices",           "rates_hz",
-                                            "counters", "latency_us", "realtime", "marker_residual_mm"};
+  static const std::set<std::string> kKnown{
+      "version",  "uptime_s",           "mode",    "devices", "rates_hz", "counters", "latency_us",
+      "realtime", "marker_residual_mm", "tracking"};
   json others = json::object();
   for (const auto& [key, value] : status.items()) {
     if (kKnown.count(key) == 0) others[key] = value;

@@ -1,4 +1,5 @@
 // The daemon as an operator meets it.
+#include <cmath>
 #include <csignal>
 
 #include "daemon/control/exit_code.hpp"
@@ -19,6 +20,17 @@ bool comes_to_rest(Rig& rig) {
     if (still(rig)) return true;
   }
   return false;
+}
+
+/// Largest joint difference; the plant creeps by some 1e-5 rad while it settles.
+double difference_rad(const json& a, const json& b) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < 6; ++i) largest = std::max(largest, std::abs(a[i].get<double>() - b[i].get<double>()));
+  return largest;
+}
+
+bool hand_was_stopped(Rig& rig) {
+  return rig.until([&](const json&) { return rig.report()["mia"]["stops"] > 0; }, 2);
 }
 
 TEST(System, ArmAndHandFollowTheRecordingAndEveryFrameIsUsedOnce) {
@@ -125,7 +137,7 @@ TEST(System, ALostArmStopsAndReconnectingMovesNothing) {
   const json q = rig.report()["arm_now"]["q_rad"];
   EXPECT_FALSE(rig.ask(Command::kEngage)["ok"]) << "stopped needs a reset first";
   ASSERT_TRUE(rig.until([&](const json&) { return rig.ask(Command::kReset)["ok"].get<bool>(); }));
-  EXPECT_EQ(rig.report()["arm_now"]["q_rad"], q);
+  EXPECT_LT(difference_rad(rig.report()["arm_now"]["q_rad"], q), 1e-3);
   ASSERT_TRUE(rig.engage());
 }
 
@@ -174,7 +186,7 @@ TEST(System, StopAndDisengageBringTheArmToRest) {
   EXPECT_TRUE(rig.ask(Command::kStop)["ok"]);
   EXPECT_EQ(rig.mode(), "stopped");
   EXPECT_TRUE(comes_to_rest(rig));
-  EXPECT_GE(rig.report()["mia"]["stops"].get<int>(), 1);
+  EXPECT_TRUE(hand_was_stopped(rig));
 }
 
 TEST(System, TheHandSkipsToHoldWhenMarkersOfTheBackVanish) {

@@ -198,6 +198,19 @@ TEST(MiaHand, StopStandsWithinATenthOfASecondAndStaysUntilHoldAndMove) {
   EXPECT_EQ(rig.simulator.counters().stops, 2u) << "a second stop is sent like the first";
 }
 
+TEST(MiaHand, MotionUnderWayWhenTheStopCameIsSentAgainAfterwards) {
+  sim::MiaSimulatorConfig simulated;
+  simulated.ack_delay = milliseconds(20);
+  MiaRig rig(patient_config(), simulated);
+  const HandCommand move = MiaRig::move(0.5, 0.5, 0.5, std::chrono::seconds(60));
+  ASSERT_EQ(rig.hand->write(move, transport::now()), IoStatus::kDone);
+  ASSERT_TRUE(rig.cycle(MiaRig::plain(HandAction::kStop)));
+  EXPECT_EQ(rig.simulator.counters().motions, 1u) << "the thumb was told, the rest dropped";
+  ASSERT_TRUE(rig.cycle(MiaRig::plain(HandAction::kHold)));
+  ASSERT_TRUE(rig.cycle(move));
+  EXPECT_EQ(rig.simulator.counters().motions, 4u) << "all three, the thumb too";
+}
+
 TEST(MiaHand, StopIsSentFourTimesAndThenAsZeroSpeedBeforeTheSessionIsGivenUp) {
   MiaRig rig(quick_config());
   ASSERT_TRUE(rig.cycle(MiaRig::move(1.1, 1.3, 1.3)));
