@@ -73,7 +73,8 @@ static void print_hand_state(const void* sample) {
 static void print_status(const void* sample) {
   const embody_msgs_msg_dds__Status_* s = sample;
   print_stamp(&s->stamp);
-  printf("status: %s (%s)", s->mode, s->cause);
+  printf("status: %s", s->mode);
+  if (s->cause[0] != '\0') printf(" (%s)", s->cause);
   for (uint32_t i = 0; i < s->rates._length; ++i)
     printf(" %s=%.1fHz", s->rates._buffer[i].name, s->rates._buffer[i].rate_hz);
   for (uint32_t i = 0; i < s->latencies._length; ++i)

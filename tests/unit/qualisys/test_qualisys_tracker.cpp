@@ -225,6 +225,9 @@ TEST(QualisysTracker, FindsARestartedServer) {
 TEST(QualisysTracker, ReadsWithoutHeap) {
   Lab lab;
   const int fd = lab.connect_and_play();
+#ifndef EMBODY_SANITIZED
+  ASSERT_GT(test::heap_allocations(), 0U) << "the counter counts";
+#endif
   for (std::size_t k = 0; k < lab.recording.frames.size(); ++k) {
     MarkerFrame frame;
     IoStatus status = IoStatus::kEmpty;

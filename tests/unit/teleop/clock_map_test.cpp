@@ -33,7 +33,8 @@ TEST(ClockMap, KeepsTheSpacingOfTheDeviceWhateverTheDelays) {
   TimePoint arrival = device.advance(milliseconds(2));
   TimePoint last = map.map(device.time, arrival);
   for (int i = 0; i < 50'000; ++i) {
-    arrival = device.advance(milliseconds(2), random(0.0, 1.0) < 0.2 ? Duration(from_seconds(random(0.0, 0.030))) : Duration{0});
+    arrival = device.advance(milliseconds(2),
+                             random(0.0, 1.0) < 0.2 ? Duration(from_seconds(random(0.0, 0.030))) : Duration{0});
     const TimePoint mapped = map.map(device.time, arrival);
     ASSERT_LE(mapped, arrival) << "from the future";
     ASSERT_LT(std::abs((mapped - last - milliseconds(2)).count()), microseconds(20).count()) << "message " << i;
