@@ -1,6 +1,7 @@
 #include "daemon/ctl/demo_view.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -43,6 +44,7 @@ __attribute__((format(printf, 2, 3))) void add(std::string& out, const char* for
 void add_latency(std::string& out, const json& latency) {
   add(out, "  latency [us]     %10s %10s %10s %10s\n", "median", "p99", "p99.9", "max");
   for (const char* stage : kStages) {
+    if (!latency.contains(stage)) continue;  // nothing measured yet
     const std::string path = std::string(stage) + "/";
     add(out, "    %-14s %10.1f %10.1f %10.1f %10.1f\n", stage, number(latency, path + "p50"),
         number(latency, path + "p99"), number(latency, path + "p999"), number(latency, path + "max"));
@@ -76,6 +78,10 @@ std::string live_table(const std::string& status, const DemoProgress& progress) 
 std::string live_line(const std::string& status, const DemoProgress& progress) {
   const json s = parse(status);
   std::string out;
+  if (!s.contains("/latency_us/total"_json_pointer)) {
+    add(out, "%5.1f s  %-8s %s\n", progress.elapsed_s, text(s, "mode/name").c_str(), text(s, "mode/cause").c_str());
+    return out;
+  }
   add(out,
       "%5.1f s  %-8s tracker %5.1f Hz  arm %5.1f Hz  hand %4.1f Hz  total p50 %.0f us  arm error %.1f mm  hand %.3f "
       "rad\n",

@@ -80,12 +80,12 @@ ArmCondition arm_condition(const ControllerStatus& status) noexcept {
 }
 
 bool decode_state(Bytes fields, ArmState& state) noexcept {
-  constexpr double kLongestUptime_s = 9e9;  // int64 nanoseconds
+  constexpr double kLongestUptime = 9e9;  // s: int64 nanoseconds
   const double timestamp_s = load<double>(fields, kTimestamp);
   const Vector6 q_rad = load_vector(fields, kActualQ);
   const Vector6 qd_rad_s = load_vector(fields, kActualQd);
   const Vector6 q_target_rad = load_vector(fields, kTargetQ);
-  if (!(std::abs(timestamp_s) < kLongestUptime_s)) return false;
+  if (!(std::abs(timestamp_s) < kLongestUptime)) return false;
   if (!q_rad.allFinite() || !qd_rad_s.allFinite() || !q_target_rad.allFinite()) return false;
   state.controller_time = Duration(std::llround(timestamp_s * 1e9));
   state.q_rad = q_rad;

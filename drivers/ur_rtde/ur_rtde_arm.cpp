@@ -16,11 +16,11 @@ namespace {
 
 using rtde::PackageType;
 
-constexpr double kSeriesRate_hz = 500.0;  // control cycles of e-Series and later
-constexpr double kCb3Rate_hz = 125.0;
+constexpr double kSeriesRate = 500.0;  // Hz: control cycles of e-Series and later
+constexpr double kCb3Rate = 125.0;     // Hz
 
 double control_rate_hz(const rtde::ControllerVersion& version) noexcept {
-  return version.major <= 3 ? kCb3Rate_hz : kSeriesRate_hz;
+  return version.major <= 3 ? kCb3Rate : kSeriesRate;
 }
 
 /// The controller sends one package each floor(control rate / wanted rate) cycles.
@@ -46,7 +46,7 @@ Result<ArmInfo> UrRtdeArm::connect() {
   close_session();
   reason_ = {};
   last_text_ = {};
-  if (!(config_.frequency_hz >= 1.0 && config_.frequency_hz <= kSeriesRate_hz)) {
+  if (!(config_.frequency_hz >= 1.0 && config_.frequency_hz <= kSeriesRate)) {
     return make_error(Errc::kInvalidArgument, "the arm's frequency is %g Hz; choose 1 to 500", config_.frequency_hz);
   }
   const TimePoint start = transport::now();

@@ -15,7 +15,8 @@ constexpr std::size_t kMaxInputRecipes = 255;
 
 /// One package each floor(control rate / wanted rate) control cycles.
 std::uint64_t divider(double control_hz, double wanted_hz) noexcept {
-  return static_cast<std::uint64_t>(std::max(1.0, std::floor(control_hz / wanted_hz)));
+  constexpr double kMost = 1e9;  // a tiny rate must not leave the range of an integer
+  return static_cast<std::uint64_t>(std::clamp(std::floor(control_hz / wanted_hz), 1.0, kMost));
 }
 
 }  // namespace

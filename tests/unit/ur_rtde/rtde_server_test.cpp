@@ -240,6 +240,17 @@ TEST(RtdeSession, SkipsLatePackagesInsteadOfQueuingThem) {
   EXPECT_EQ(sent(7, 100), 1U);
 }
 
+TEST(RtdeSession, AVanishingRateSendsNothingAndDoesNoHarm) {
+  RtdeShared shared;
+  PairedSession pair(shared, 1);
+  ASSERT_TRUE(pair.send(hex("00 05 56 00 02")));
+  ASSERT_TRUE(pair.send(rtde::encode_outputs_request(1e-300, "timestamp")));
+  ASSERT_TRUE(pair.send(kStart));
+  pair.drain();
+  EXPECT_TRUE(pair.session->publish(0, 1'000'000));
+  EXPECT_EQ(pair.drain(), 0U);
+}
+
 /// Random packages, many of them almost right, straight into a session over a socket pair.
 TEST(RtdeSession, SurvivesRandomPackagesWithBoundedMemory) {
   std::mt19937_64 random(11);

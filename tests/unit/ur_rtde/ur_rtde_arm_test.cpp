@@ -1,7 +1,6 @@
 #include "drivers/ur_rtde/ur_rtde_arm.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +9,7 @@
 #include <numbers>
 
 #include "drivers/sim/ur/ur_controller.hpp"
-#include "tests/unit/ur_rtde/fake_controller.hpp"
+#include "tests/unit/ur_rtde/arm_loop.hpp"
 #include "tests/unit/ur_rtde/heap_counter.hpp"
 
 namespace embody {
@@ -18,66 +17,8 @@ namespace {
 
 using sim::ProgramState;
 using sim::UrController;
+using test::kPatience;
 using transport::now;
-
-constexpr Duration kPatience = std::chrono::seconds(5);
-
-/// An arm driver with the loop that a daemon would run around it: one command per package.
-class Loop {
- public:
-  explicit Loop(std::uint16_t port, Duration in_use_patience = std::chrono::seconds(4)) {
-    UrRtdeConfig config;
-    config.port = port;
-    config.in_use_patience = in_use_patience;
-    arm = std::make_unique<UrRtdeArm>(config);
-    const auto info = arm->connect();
-    connected = info.ok();
-    if (info) fd = info->fd;
-    if (!info) error = info.error();
-  }
-  /// Waits for the next package; false when the session is over or nothing comes.
-  bool next() {
-    const TimePoint deadline = now() + kPatience;
-    while (true) {
-      const IoStatus status = arm->read(state);
-      if (status == IoStatus::kDone) return true;
-      if (status == IoStatus::kDisconnected || !transport::wait_readable(fd, deadline)) return false;
-    }
-  }
-  IoStatus send(ArmAction action, const Vector6& q = Vector6::Zero(), const Vector6& qd = Vector6::Zero()) {
-    ArmCommand command;
-    command.sequence = ++sequence;
-    command.action = action;
-    command.q_rad = q;
-    command.qd_rad_s = qd;
-    command.t_expires = now() + std::chrono::milliseconds(50);
-    return arm->write(command, now());
-  }
-  /// Sends one command per package until `done` holds for the newest state.
-  template <class Done>
-  bool send_until(ArmAction action, const Vector6& q, Done done) {
-    const TimePoint deadline = now() + kPatience;
-    while (now() < deadline && next()) {
-      if (done(state)) return true;
-      send(action, q);
-    }
-    return false;
-  }
-  /// Hold, then track the present position.
-  bool engage() {
-    if (send(ArmAction::kHold) != IoStatus::kDone) return false;
-    const auto seen = [this](const ArmState& s) { return s.echo_sequence == sequence; };
-    if (!send_until(ArmAction::kHold, Vector6::Zero(), seen)) return false;
-    return send_until(ArmAction::kTrack, state.q_rad, [](const ArmState& s) { return s.tracking; });
-  }
-
-  std::unique_ptr<UrRtdeArm> arm;
-  ArmState state;
-  int fd{-1};
-  std::uint32_t sequence{0};
-  bool connected{false};
-  Error error;
-};
 
 class UrRtdeArmOnSimulator : public testing::Test {
  protected:
@@ -123,7 +64,7 @@ TEST_F(UrRtdeArmOnSimulator, ReportsTheRateThatTheControllerReallySends) {
 TEST_F(UrRtdeArmOnSimulator, TracksASineAtFiveHundredHertzWithOneCommandPerPackage) {
   constexpr int kPackages = 1000;
   constexpr double kAmplitude = 0.05, kOmega = std::numbers::pi;
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.connected) << loop.error.detail.c_str();
   ASSERT_TRUE(loop.engage());
   const sim::UrCounters before = controller.counters();
@@ -161,7 +102,7 @@ TEST_F(UrRtdeArmOnSimulator, TracksASineAtFiveHundredHertzWithOneCommandPerPacka
 }
 
 TEST_F(UrRtdeArmOnSimulator, AFrozenSenderLeavesTheProgramStaleAndTheArmStill) {
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.engage());
   const Vector6 far = start + Vector6::Constant(1.5);
   ASSERT_TRUE(loop.send_until(ArmAction::kTrack, far, [&](const ArmState& s) {
@@ -185,7 +126,7 @@ TEST_F(UrRtdeArmOnSimulator, AFrozenSenderLeavesTheProgramStaleAndTheArmStill) {
 }
 
 TEST_F(UrRtdeArmOnSimulator, AfterALostSessionNothingMovesBeforeHoldAndThenTrack) {
-  Loop lost(controller.port());
+  test::ArmLoop lost(controller.port());
   ASSERT_TRUE(lost.engage());
   ASSERT_TRUE(lost.send_until(ArmAction::kTrack, start + Vector6::Constant(1.0),
                               [](const ArmState& s) { return s.qd_rad_s[0] > 0.3; }));
@@ -195,7 +136,7 @@ TEST_F(UrRtdeArmOnSimulator, AfterALostSessionNothingMovesBeforeHoldAndThenTrack
   EXPECT_EQ(lost.send(ArmAction::kTrack, start), IoStatus::kDisconnected);
   EXPECT_FALSE(lost.arm->reason().empty());
 
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.connected) << loop.error.detail.c_str();
   for (int i = 0; i < 400; ++i) ASSERT_TRUE(loop.next());  // comes to rest without any command
   EXPECT_FALSE(loop.state.tracking);
@@ -214,10 +155,10 @@ TEST_F(UrRtdeArmOnSimulator, AfterALostSessionNothingMovesBeforeHoldAndThenTrack
 }
 
 TEST_F(UrRtdeArmOnSimulator, ASecondClientIsToldWhoMayOwnTheRegisters) {
-  Loop owner(controller.port());
+  test::ArmLoop owner(controller.port());
   ASSERT_TRUE(owner.connected);
   const TimePoint begin = now();
-  Loop second(controller.port(), std::chrono::milliseconds(300));
+  test::ArmLoop second(controller.port(), std::chrono::milliseconds(300));
   EXPECT_FALSE(second.connected);
   EXPECT_GE(now() - begin, std::chrono::milliseconds(100)) << "it must have tried again";
   EXPECT_EQ(second.error.code, Errc::kRefused);
@@ -226,9 +167,9 @@ TEST_F(UrRtdeArmOnSimulator, ASecondClientIsToldWhoMayOwnTheRegisters) {
 }
 
 TEST_F(UrRtdeArmOnSimulator, WaitsForRegistersThatALostSessionStillOwns) {
-  auto owner = std::make_unique<Loop>(controller.port());
+  auto owner = std::make_unique<test::ArmLoop>(controller.port());
   ASSERT_TRUE(owner->connected);
-  auto second = std::async(std::launch::async, [&] { return Loop(controller.port()).connected; });
+  auto second = std::async(std::launch::async, [&] { return test::ArmLoop(controller.port()).connected; });
   const TimePoint deadline = now() + kPatience;
   while (controller.counters().clients_accepted < 2 && now() < deadline) ASSERT_TRUE(owner->next());
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(owner->next());  // long enough to be refused at least once
@@ -237,7 +178,7 @@ TEST_F(UrRtdeArmOnSimulator, WaitsForRegistersThatALostSessionStillOwns) {
 }
 
 TEST_F(UrRtdeArmOnSimulator, StopsOfTheRobotShowInItsCondition) {
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.engage());
   const auto becomes = [&](ArmCondition condition) {
     return loop.send_until(ArmAction::kHold, Vector6::Zero(),
@@ -260,7 +201,7 @@ TEST_F(UrRtdeArmOnSimulator, StopsOfTheRobotShowInItsCondition) {
 }
 
 TEST_F(UrRtdeArmOnSimulator, AFrozenControllerIsSilentAndItsFullBufferEndsTheSession) {
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.engage());
   controller.freeze(true);
   while (transport::wait_readable(loop.fd, now() + std::chrono::milliseconds(100))) {
@@ -281,7 +222,7 @@ TEST_F(UrRtdeArmOnSimulator, AFrozenControllerIsSilentAndItsFullBufferEndsTheSes
 }
 
 TEST_F(UrRtdeArmOnSimulator, RefusesCommandsThatHaveExpiredOrAreNotFinite) {
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.next());
   ArmCommand command;
   command.action = ArmAction::kTrack;
@@ -310,7 +251,7 @@ TEST_F(UrRtdeArmOnSimulator, ReadAndWriteDoNotTouchTheHeap) {
 #if !defined(EMBODY_SANITIZED)
   ASSERT_GT(test::heap_allocations(), before_control) << "the counter must count";
 #endif
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.engage());
   const std::uint64_t before = test::heap_allocations();
   for (int i = 0; i < 200; ++i) {
@@ -328,7 +269,7 @@ TEST_F(UrRtdeArmOnSimulator, ReadAndWriteDoNotTouchTheHeap) {
 
 TEST_F(UrRtdeArmOnSimulator, TheDestructorLeavesModeZeroAndTheArmStill) {
   {
-    Loop loop(controller.port());
+    test::ArmLoop loop(controller.port());
     ASSERT_TRUE(loop.engage());
     ASSERT_TRUE(loop.send_until(ArmAction::kTrack, start + Vector6::Constant(1.0),
                                 [](const ArmState& s) { return s.qd_rad_s[0] > 0.3; }));
@@ -340,7 +281,7 @@ TEST_F(UrRtdeArmOnSimulator, TheDestructorLeavesModeZeroAndTheArmStill) {
 }
 
 TEST_F(UrRtdeArmOnSimulator, ConnectingAgainReleasesTheOldSession) {
-  Loop loop(controller.port());
+  test::ArmLoop loop(controller.port());
   ASSERT_TRUE(loop.engage());
   const auto info = loop.arm->connect();
   ASSERT_TRUE(info.ok()) << info.error().detail.c_str();
@@ -348,106 +289,6 @@ TEST_F(UrRtdeArmOnSimulator, ConnectingAgainReleasesTheOldSession) {
   ASSERT_TRUE(loop.next());
   EXPECT_EQ(loop.state.package, 1U);
   EXPECT_TRUE(loop.engage());
-}
-
-Errc connect_error(const test::FakeController& fake, std::string* detail = nullptr) {
-  UrRtdeConfig config;
-  config.port = fake.port();
-  config.reply_timeout = std::chrono::milliseconds(200);
-  config.in_use_patience = std::chrono::milliseconds(200);
-  UrRtdeArm arm(config);
-  const auto info = arm.connect();
-  EXPECT_FALSE(info.ok());
-  if (detail != nullptr) *detail = info.error().detail.view();
-  return info.ok() ? Errc::kIo : info.error().code;
-}
-
-TEST(UrRtdeArmSetUp, NamesAVariableThatTheFirmwareDoesNotKnow) {
-  const test::FakeController fake([](char type) {
-    test::ReplyBytes reply = test::healthy_reply(type);
-    if (type != 'O') return reply;
-    std::string types(rtde::as_text(rtde::Bytes(reply).subspan(4)));
-    types.replace(types.find("INT32"), 5, "NOT_FOUND");
-    return rtde::encode_setup_reply(rtde::PackageType::kSetupOutputs, {0, types});
-  });
-  std::string detail;
-  EXPECT_EQ(connect_error(fake, &detail), Errc::kNotFound);
-  EXPECT_NE(detail.find("robot_mode"), std::string::npos) << detail;
-}
-
-TEST(UrRtdeArmSetUp, ExplainsEveryRefusalAndSilence) {
-  const auto with = [](char type, const char* reply) {
-    return [=](char asked) { return asked == type ? test::hex(reply) : test::healthy_reply(asked); };
-  };
-  EXPECT_EQ(connect_error(test::FakeController(with('V', "00 04 56 00"))), Errc::kUnsupported);
-  EXPECT_EQ(connect_error(test::FakeController(with('v', "00 04 76 00"))), Errc::kMalformed);
-  EXPECT_EQ(connect_error(test::FakeController(with('O', "00 03 4f"))), Errc::kMalformed);
-  EXPECT_EQ(connect_error(test::FakeController(with('I', "00 0a 49 01 'DOUBLE'"))), Errc::kMalformed);
-  EXPECT_EQ(connect_error(test::FakeController(with('S', "00 04 53 00"))), Errc::kRefused);
-  EXPECT_EQ(connect_error(test::FakeController(with('V', "00 01"))), Errc::kMalformed);
-  for (const char silent : {'V', 'v', 'O', 'I', 'S'}) {
-    EXPECT_EQ(connect_error(test::FakeController(with(silent, ""))), Errc::kTimeout) << silent;
-  }
-}
-
-TEST(UrRtdeArmSetUp, QuotesTheLastTextOfTheControllerInItsError) {
-  const test::FakeController fake([](char type) {
-    using test::operator+;
-    return type == 'S' ? test::hex("00 0a 4d 03 'why' 01 'd' 01") + test::hex("00 04 53 00")
-                       : test::healthy_reply(type);
-  });
-  std::string detail;
-  EXPECT_EQ(connect_error(fake, &detail), Errc::kRefused);
-  EXPECT_NE(detail.find("why"), std::string::npos) << detail;
-}
-
-TEST(UrRtdeArmSetUp, NobodyListeningIsDisconnectedAndABadFrequencyIsRefused) {
-  UrRtdeConfig config;
-  config.port = 1;
-  EXPECT_EQ(UrRtdeArm(config).connect().error().code, Errc::kDisconnected);
-  for (const double frequency : {0.0, 501.0, std::nan("")}) {
-    config.frequency_hz = frequency;
-    EXPECT_EQ(UrRtdeArm(config).connect().error().code, Errc::kInvalidArgument);
-  }
-}
-
-TEST(UrRtdeArmSetUp, ToleratesTextsStaleDataAndAnyFragmentation) {
-  for (const std::size_t part : {0U, 1U, 2U, 7U}) {
-    const test::FakeController fake(
-        [](char type) {
-          using test::operator+;
-          auto reply = test::hex("00 09 4d 02 'hi' 01 'd' 03") + test::state_package(1.0) + test::healthy_reply(type);
-          return type == 'S' ? reply + test::state_package(2.0) + test::state_package(2.002) : reply;
-        },
-        part);
-    Loop loop(fake.port());
-    ASSERT_TRUE(loop.connected) << loop.error.detail.c_str();
-    EXPECT_EQ(loop.arm->last_text(), "hi");
-    ASSERT_TRUE(loop.next());
-    EXPECT_EQ(loop.state.controller_time, std::chrono::seconds(2));
-    ASSERT_TRUE(loop.next());
-    EXPECT_EQ(loop.state.controller_time, std::chrono::milliseconds(2002));
-    EXPECT_EQ(loop.state.package, 2U);
-    EXPECT_EQ(loop.state.condition, ArmCondition::kReady);
-  }
-}
-
-TEST(UrRtdeArmStream, BytesThatBreakTheProtocolEndTheSession) {
-  using test::operator+;
-  const std::vector<test::ReplyBytes> endings{test::hex("00 02 55"), test::hex("00 05 55 01 00"),
-                                              test::state_package(std::nan("")), test::state_package(1.0, HUGE_VAL)};
-  for (const auto& ending : endings) {
-    const test::FakeController fake([&](char type) {
-      return type == 'S' ? test::healthy_reply(type) + test::state_package(1.0) + ending : test::healthy_reply(type);
-    });
-    Loop loop(fake.port());
-    ASSERT_TRUE(loop.connected);
-    EXPECT_TRUE(loop.next()) << "the good package before counts";
-    EXPECT_FALSE(loop.next());
-    EXPECT_EQ(loop.arm->read(loop.state), IoStatus::kDisconnected);
-    EXPECT_EQ(loop.send(ArmAction::kHold), IoStatus::kDisconnected);
-    EXPECT_FALSE(loop.arm->reason().empty());
-  }
 }
 
 }  // namespace
