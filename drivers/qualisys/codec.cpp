@@ -132,7 +132,7 @@ Status decode_data(std::span<const std::byte> packet, DataPacket& data) noexcept
   data.frame_number = load<std::uint32_t>(packet, 16);
   data.has_markers = false;
   data.markers.clear();
-  if (data.timestamp_us > kMaxTimestamp_us) return make_error(Errc::kMalformed, "QTM time stamp out of range");
+  if (data.timestamp_us > kMaxTimestampUs) return make_error(Errc::kMalformed, "QTM time stamp out of range");
   const std::size_t components = load<std::uint32_t>(packet, 20);
   auto rest = packet.subspan(kDataHeaderSize);
   for (std::size_t i = 0; i < components; ++i) {

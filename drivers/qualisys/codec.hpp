@@ -17,7 +17,7 @@ inline constexpr std::size_t kHeaderSize = 8;
 inline constexpr std::size_t kMaxPacketSize = std::size_t{16} << 20;
 inline constexpr std::size_t kMaxDataMarkers = 256;
 /// Largest time stamp, µs: beyond any clock QTM can be fed with, and small enough for nanoseconds in 63 bits.
-inline constexpr std::uint64_t kMaxTimestamp_us = 4'000'000'000'000'000;
+inline constexpr std::uint64_t kMaxTimestampUs = 4'000'000'000'000'000;
 
 enum class PacketType : std::uint32_t {
   kError = 0,

@@ -6,7 +6,7 @@ namespace embody::recording::tsv {
 
 inline constexpr double kMetresPerMillimetre = 1e-3;
 /// Coordinates beyond this are no measurement (10 km).
-inline constexpr double kMaxCoordinate_mm = 1e7;
+inline constexpr double kMaxCoordinateMm = 1e7;
 
 /// Frame rates outside of 0.001 to 100,000 Hz are no measurement, nor is NaN.
 constexpr bool is_rate(double rate_hz) noexcept {

@@ -289,7 +289,7 @@ class Parser {
         continue;
       }
       double value_mm = 0.0;
-      if (!parse_number(field, value_mm) || !(std::abs(value_mm) <= tsv::kMaxCoordinate_mm)) {
+      if (!parse_number(field, value_mm) || !(std::abs(value_mm) <= tsv::kMaxCoordinateMm)) {
         const char* hint = field.find(',') == std::string_view::npos ? "" : " (use the decimal point)";
         return at_line(Errc::kMalformed, "column '" + column_name(3 * index + axis) + "': " + quoted(field) +
                                              " is not a coordinate in millimetres" + hint);

@@ -57,7 +57,7 @@ Status check(const Recording& recording) {
     const auto& markers = recording.frames[k];
     const bool plausible = std::all_of(markers.begin(), markers.end(), [](const Marker& marker) {
       const double largest_m = marker.p_W.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
-      return !marker.visible || largest_m <= tsv::kMaxCoordinate_mm * tsv::kMetresPerMillimetre;
+      return !marker.visible || largest_m <= tsv::kMaxCoordinateMm * tsv::kMetresPerMillimetre;
     });
     if (plausible && markers.size() == recording.marker_names.size()) continue;
     return make_error(Errc::kInvalidArgument, "cannot write frame %zu: wrong number of markers or no real positions",

@@ -1,0 +1,118 @@
+#include "daemon/loops/finger_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/hand/synthetic_motion.hpp"
+#include "daemon/app/config_io.hpp"
+#include "daemon/app/models.hpp"
+#include "tests/unit/loops/fakes.hpp"
+
+namespace embody {
+namespace {
+
+using std::chrono::milliseconds;
+using test::eventually;
+using transport::now;
+
+Models shipped_models() {
+  const auto config = config::load_config(EMBODY_SOURCE_DIR "/config/embody.toml");
+  if (!config) throw std::runtime_error(std::string(config.error().detail.view()));
+  Result<Models> models = make_models(*config);
+  if (!models) throw std::runtime_error(std::string(models.error().detail.view()));
+  return std::move(models).value();
+}
+
+/// A finger loop with the shipped models, and a synthetic hand to feed it.
+class FingerBench {
+ public:
+  explicit FingerBench(const FingerLoopConfig& config = {})
+      : models(shipped_models()), loop(models.fingers, models.embodiment, config, edges) {}
+
+  void publish(std::size_t k) {
+    TrackedFrame tracked;
+    tracked.frame = motion.frame(k).markers;
+    tracked.frame.t_capture = tracked.frame.t_arrival = now();
+    tracked.pose = models.hand_pose.step(tracked.frame);
+    tracked.pose.sequence = tracked.sequence = ++sequence;
+    edges.frame_to_fingers.publish(tracked);
+    edges.fingers_wake.notify();
+  }
+  [[nodiscard]] std::uint64_t used() const { return edges.counters.finger_frames; }
+
+  hand::SyntheticMotion motion;
+  Models models;
+  Edges edges;
+  FingerLoop loop;
+  std::uint64_t sequence{0};
+};
+
+TEST(FingerLoop, TurnsEachFrameIntoAFingerTarget) {
+  FingerBench bench;
+  test::WatchedThread thread([&] { bench.loop.run(); });
+  for (std::size_t k = 0; k < 20; ++k) {
+    bench.publish(k);
+    ASSERT_TRUE(eventually([&] { return bench.used() == k + 1; })) << "frame " << k;
+    ASSERT_TRUE(bench.edges.target_to_hand.update());
+    const FingerTarget& target = bench.edges.target_to_hand.get();
+    EXPECT_TRUE(target.valid);
+    EXPECT_EQ(target.frame_number, k + 1);
+    EXPECT_EQ(target.joint_count, bench.models.embodiment.motor_count());
+    EXPECT_GE(target.t_solved, target.t_arrival);
+    FingerTiming timing;
+    ASSERT_TRUE(bench.edges.finger_timings.pop(timing));
+    EXPECT_LE(timing.t_taken, timing.t_solved);
+  }
+  bench.edges.stop = true;
+  EXPECT_EQ(thread.join(), 0U) << "heap uses";
+  EXPECT_EQ(bench.edges.counters.finger_skipped, 0U);
+}
+
+TEST(FingerLoop, TakesTheNewestFrameAndCountsTheOnesItPassesOver) {
+  FingerBench bench;
+  test::WatchedThread thread([&] { bench.loop.run(); });
+  bench.publish(0);
+  EXPECT_TRUE(eventually([&] { return bench.used() == 1; }));  // skips count from the first frame on
+  for (std::size_t k = 1; k < 500; ++k) bench.publish(k);
+  EXPECT_TRUE(eventually([&] { return bench.used() + bench.edges.counters.finger_skipped == 500; }));
+  bench.edges.stop = true;
+  thread.join();
+  bench.edges.target_to_hand.update();
+  EXPECT_EQ(bench.edges.target_to_hand.get().frame_number, 500U) << "the newest frame is always used in the end";
+}
+
+TEST(FingerLoop, ComputesForHalfOfTheTimeAtMost) {
+  FingerLoopConfig slow;
+  slow.slow_down = milliseconds(20);
+  slow.slow_down_spins = true;
+  FingerBench bench(slow);
+  const TimePoint start = now();
+  test::WatchedThread thread([&] { bench.loop.run(); });
+  for (std::size_t k = 0; now() - start < milliseconds(800); ++k) {
+    bench.publish(k % bench.motion.frame_count());
+    std::this_thread::yield();
+  }
+  const std::uint64_t used = bench.used();
+  const Duration elapsed = now() - start;
+  bench.edges.stop = true;
+  thread.join();
+  EXPECT_GT(used, 2U);
+  // Half of each window of 100 ms, one frame that began before the half was over, and the window that has just begun.
+  EXPECT_LE(used * milliseconds(20), elapsed / 2 + milliseconds(50 + 20 + 20));
+}
+
+TEST(FingerLoop, MarksTargetsOfAHandThatIsNotSeen) {
+  FingerBench bench;
+  test::WatchedThread thread([&] { bench.loop.run(); });
+  TrackedFrame nothing;
+  nothing.sequence = 1;
+  bench.edges.frame_to_fingers.publish(nothing);
+  bench.edges.fingers_wake.notify();
+  EXPECT_TRUE(eventually([&] { return bench.used() == 1; }));
+  bench.edges.stop = true;
+  thread.join();
+  bench.edges.target_to_hand.update();
+  EXPECT_FALSE(bench.edges.target_to_hand.get().valid);
+}
+
+}  // namespace
+}  // namespace embody

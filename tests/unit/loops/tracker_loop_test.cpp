@@ -1,0 +1,141 @@
+#include "daemon/loops/tracker_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/loops/fakes.hpp"
+
+namespace embody {
+namespace {
+
+using transport::now;
+
+/// A tracker loop over a fake tracker with the paper's glove.
+class TrackerBench {
+ public:
+  TrackerBench()
+      : baton(tracker), loop(baton, hand::HandPoseEstimator(hand::paper_glove(), hand::paper_calibration()), edges) {
+    tracker.fd = ready.get();
+  }
+  /// Frame with the three markers on the back of a hand that moves slowly.
+  static void fill(MarkerFrame& frame, std::uint64_t number, TimePoint t_capture) {
+    frame = {};
+    frame.frame_number = number;
+    frame.t_capture = frame.t_arrival = t_capture;
+    frame.count = hand::paper_glove().names.size();
+    const double x = 1e-5 * static_cast<double>(number);
+    frame.markers[0] = {{x + 0.110, 0.135, 0.460}, true};
+    frame.markers[1] = {{x + 0.062, 0.161, 0.450}, true};
+    frame.markers[2] = {{x + 0.066, 0.130, 0.452}, true};
+  }
+  std::uint64_t run() {
+    baton.pass_to_loop(*tracker.connect());
+    test::WatchedThread thread([this] { loop.run(); });
+    return thread.join();
+  }
+
+  test::EventFd ready{true};
+  test::FakeTracker tracker;
+  Edges edges;
+  TrackerBaton baton;
+  TrackerLoop loop;
+};
+
+TEST(TrackerLoop, UsesEveryBufferedFrameOnceAndPublishesTheNewest) {
+  TrackerBench bench;
+  constexpr std::uint64_t kFrames = 1000;
+  std::uint64_t number = 0;
+  const TimePoint start = now();
+  bench.tracker.on_read = [&](MarkerFrame& frame) {
+    if (number == kFrames) {
+      bench.edges.stop = true;
+      return IoStatus::kEmpty;
+    }
+    ++number;
+    TrackerBench::fill(frame, number, start + number * std::chrono::milliseconds(10));
+    return IoStatus::kDone;
+  };
+  EXPECT_EQ(bench.run(), 0U) << "heap uses";
+  EXPECT_EQ(bench.edges.counters.frames_received, kFrames);
+  EXPECT_EQ(bench.edges.counters.frames_used, kFrames);
+  EXPECT_EQ(bench.edges.counters.poses_invalid, 0U);
+  ASSERT_TRUE(bench.edges.pose_to_arm.update());
+  const HandPose& pose = bench.edges.pose_to_arm.get();
+  EXPECT_TRUE(pose.valid);
+  EXPECT_EQ(pose.frame_number, kFrames);
+  EXPECT_EQ(pose.sequence, kFrames);
+  EXPECT_EQ(pose.streak, kFrames) << "each frame has stepped the pose path, in order";
+  EXPECT_LE(pose.t_decoded, pose.t_estimated);
+  ASSERT_TRUE(bench.edges.frame_to_fingers.update());
+  EXPECT_EQ(bench.edges.frame_to_fingers.get().sequence, kFrames);
+  EXPECT_EQ(bench.edges.frame_to_fingers.get().frame.frame_number, kFrames);
+  EXPECT_TRUE(wait_for_input(bench.edges.fingers_wake.fd(), -1, Duration{0})) << "the finger loop was woken";
+}
+
+TEST(TrackerLoop, CountsFramesWithoutAHandAndMarksTheirPose) {
+  TrackerBench bench;
+  std::uint64_t number = 0;
+  bench.tracker.on_read = [&](MarkerFrame& frame) {
+    if (number == 100) {
+      bench.edges.stop = true;
+      return IoStatus::kEmpty;
+    }
+    TrackerBench::fill(frame, ++number, now());
+    if (number % 4 == 0) frame.markers[1].visible = false;
+    return IoStatus::kDone;
+  };
+  bench.run();
+  EXPECT_EQ(bench.edges.counters.frames_received, 100U);
+  EXPECT_EQ(bench.edges.counters.frames_used, 75U);
+  EXPECT_EQ(bench.edges.counters.poses_invalid, 25U);
+  ASSERT_TRUE(bench.edges.pose_to_arm.update());
+  EXPECT_FALSE(bench.edges.pose_to_arm.get().valid) << "the newest frame, number 100, lacks a marker";
+  EXPECT_EQ(bench.edges.pose_to_arm.get().streak, 0U);
+}
+
+TEST(TrackerLoop, GivesABrokenTrackerBackAfterUsingWhatItHadSent) {
+  TrackerBench bench;
+  std::uint64_t number = 0;
+  bench.tracker.on_read = [&](MarkerFrame& frame) {
+    if (number == 3) {
+      bench.edges.stop = true;
+      return IoStatus::kDisconnected;
+    }
+    TrackerBench::fill(frame, ++number, now());
+    return IoStatus::kDone;
+  };
+  bench.run();
+  EXPECT_TRUE(bench.baton.with_links());
+  EXPECT_EQ(bench.baton.fd(), -1);
+  ASSERT_TRUE(bench.edges.pose_to_arm.update());
+  EXPECT_EQ(bench.edges.pose_to_arm.get().frame_number, 3U);
+}
+
+TEST(TrackerLoop, GivesTheTrackerBackWhenLinksRevokeItAndTakesItAgain) {
+  TrackerBench bench;
+  std::atomic<std::uint64_t> reads{0};
+  bench.tracker.on_read = [&](MarkerFrame&) {
+    ++reads;
+    return IoStatus::kEmpty;
+  };
+  bench.baton.pass_to_loop(*bench.tracker.connect());
+  test::WatchedThread thread([&] { bench.loop.run(); });
+  EXPECT_TRUE(test::eventually([&] { return reads > 0; }));
+  bench.baton.revoke();
+  EXPECT_TRUE(test::eventually([&] { return bench.baton.with_links(); }));
+  const std::uint64_t before = reads;
+  bench.baton.pass_to_loop(*bench.tracker.connect());
+  EXPECT_TRUE(test::eventually([&] { return reads > before; }));
+  bench.edges.stop = true;
+  EXPECT_EQ(thread.join(), 0U) << "heap uses";
+}
+
+TEST(TrackerLoop, BeatsWithoutATracker) {
+  TrackerBench bench;
+  test::WatchedThread thread([&] { bench.loop.run(); });
+  EXPECT_TRUE(test::eventually([&] { return bench.edges.heartbeats.tracker > 3; }));
+  bench.edges.stop = true;
+  thread.join();
+}
+
+}  // namespace
+}  // namespace embody
