@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 // Wrist (root joint) in M: MANO's origin lies near the knuckle of the middle finger. With this offset, calibrated
 // transforms X_HM and X_PM made for MANO hold for this model.
-Vector3d wrist_M() noexcept {
+Vector3d wrist_joint() noexcept {
   return {0.0957, 0.0064, 0.0062};
 }
 
@@ -50,7 +50,7 @@ HandModel::HandModel(const HandModelConfig& config) noexcept {
   const double scale = factor(config, HandShape::kScale);
   const double girth = factor(config, HandShape::kGirth);
   const Vector3d palm(factor(config, HandShape::kPalmLength), girth, factor(config, HandShape::kPalmBreadth));
-  joints_[0] = wrist_M();
+  joints_[0] = wrist_joint();
   for (std::size_t f = 0; f < kFingers; ++f) {
     const std::size_t first = first_joint(static_cast<Finger>(f));
     const double length = factor(config, length_of(f));

@@ -84,9 +84,9 @@ class HandModel {
   explicit HandModel(const HandModelConfig& config = {}) noexcept;
 
   /// Positions of the joints in the flat hand, M, MANO's order, m.
-  [[nodiscard]] const std::array<Eigen::Vector3d, kHandModelJoints>& rest_joints_M() const noexcept { return joints_; }
+  [[nodiscard]] const std::array<Eigen::Vector3d, kHandModelJoints>& rest_joints() const noexcept { return joints_; }
   /// Ends of the fleshy finger tips in the flat hand, M, m, by Finger.
-  [[nodiscard]] const std::array<Eigen::Vector3d, kFingers>& rest_tips_M() const noexcept { return tips_; }
+  [[nodiscard]] const std::array<Eigen::Vector3d, kFingers>& rest_tips() const noexcept { return tips_; }
 
   /// Joint frames X_MJ for the 48 pose parameters (wrist first); their axes are parallel to M's in the flat hand.
   [[nodiscard]] std::array<Pose, kHandModelJoints> joint_poses(const Vector48& q_rad) const noexcept;

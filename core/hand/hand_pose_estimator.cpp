@@ -1,11 +1,13 @@
 #include "core/hand/hand_pose_estimator.hpp"
 
+#include <cmath>
+
 namespace embody::hand {
 
 bool hand_frame(const Eigen::Vector3d& p_W_top, const Eigen::Vector3d& p_W_left, const Eigen::Vector3d& p_W_right,
                 Pose& X_WH) noexcept {
   // Below these the directions are noise: real triads have edges of centimetres.
-  constexpr double kShortestEdge_m = 1e-3;
+  constexpr double kShortestEdgeMetres = 1e-3;
   constexpr double kSmallestSine = 0.02;
   const Eigen::Vector3d approach = p_W_top - p_W_right;
   const Eigen::Vector3d side = p_W_left - p_W_right;
@@ -14,7 +16,7 @@ bool hand_frame(const Eigen::Vector3d& p_W_top, const Eigen::Vector3d& p_W_left,
   const Eigen::Vector3d normal = approach.cross(side);
   const double normal_m2 = normal.norm();
   // Written so that a NaN or an overflow fails the test.
-  if (!(approach_m > kShortestEdge_m && side_m > kShortestEdge_m)) return false;
+  if (!(approach_m > kShortestEdgeMetres && side_m > kShortestEdgeMetres)) return false;
   if (!(normal_m2 > kSmallestSine * approach_m * side_m && std::isfinite(normal_m2))) return false;
   const Eigen::Vector3d z = approach / approach_m;
   const Eigen::Vector3d y = normal / normal_m2;

@@ -9,10 +9,10 @@ namespace {
 using Angles = Eigen::Matrix<double, kHandAngles, 1>;
 using Eigen::Vector3d;
 
-constexpr double kCycle_s = 15.0;
-constexpr double kNoise_m = 0.03e-3;  // standard deviation per axis
-constexpr double kRingStepFrom_s = 7.0;
-constexpr std::array<double, 3> kRingStep_M{-.0048, .0, -.0064};  // 8 mm
+constexpr double kCycleSeconds = 15.0;
+constexpr double kNoiseMetres = 0.03e-3;  // standard deviation per axis
+constexpr double kRingStepSeconds = 7.0;
+constexpr std::array<double, 3> kRingStepMetres{-.0048, .0, -.0064};  // in M, 8 mm
 constexpr std::size_t kSlots = 13, kThumbTip = 3, kRingTip = 9;
 
 enum Grip : std::size_t { kRelaxed, kOpen, kClosed };
@@ -42,9 +42,9 @@ constexpr std::array<Key, 15> kKeys{{
     {11.1, {.262, .240, .255}, {-.23, .30, -.15}, kOpen},   // release
     {12.0, {.225, .220, .320}, {-.20, .35, -.10}, kOpen},   // rise
     {13.4, {.069, .142, .426}, {.00, .00, .00}, kRelaxed},  // return
-    {kCycle_s, {.069, .142, .426}, {.00, .00, .00}, kRelaxed},
+    {kCycleSeconds, {.069, .142, .426}, {.00, .00, .00}, kRelaxed},
 }};
-constexpr double kClosedFrom_s = 3.8, kClosedTo_s = 10.3;
+constexpr double kClosedFromSeconds = 3.8, kClosedToSeconds = 10.3;
 
 // Finger angles, rounded from a real hand in the same glove. Fingers: spread (y of the knuckle), then flexion (z) of
 // knuckle, middle and end joint, from index to little finger. Thumb: all nine angles.
@@ -128,11 +128,10 @@ double normal(std::uint64_t seed, std::uint64_t a, std::uint64_t b) noexcept {
 constexpr std::uint64_t kGapStream = 1ULL << 62, kDropStream = 2ULL << 62;
 
 // Top, left, right marker in H: edges 55.2 (top-left), 44.7 (top-right) and 32.4 mm (left-right).
-std::array<Vector3d, 3> triad_H() noexcept {
-  constexpr double kTopLeft_m = .0552, kTopRight_m = .0447, kLeftRight_m = .0324;
-  const double z =
-      (kTopRight_m * kTopRight_m + kLeftRight_m * kLeftRight_m - kTopLeft_m * kTopLeft_m) / (2.0 * kTopRight_m);
-  return {Vector3d(0.0, 0.0, kTopRight_m), Vector3d(std::sqrt(kLeftRight_m * kLeftRight_m - z * z), 0.0, z),
+std::array<Vector3d, 3> triad() noexcept {
+  constexpr double kTopLeft = .0552, kTopRight = .0447, kLeftRight = .0324;
+  const double z = (kTopRight * kTopRight + kLeftRight * kLeftRight - kTopLeft * kTopLeft) / (2.0 * kTopRight);
+  return {Vector3d(0.0, 0.0, kTopRight), Vector3d(std::sqrt(kLeftRight * kLeftRight - z * z), 0.0, z),
           Vector3d(0.0, 0.0, 0.0)};
 }
 
@@ -149,11 +148,11 @@ SyntheticMotion::SyntheticMotion(const SyntheticMotionConfig& config, const Hand
 
 SyntheticFrame SyntheticMotion::frame(std::size_t k) const noexcept {
   const double t_s = static_cast<double>(k) / config_.rate_hz;
-  const Posture posture = posture_at(std::fmod(t_s, kCycle_s));
+  const Posture posture = posture_at(std::fmod(t_s, kCycleSeconds));
   SyntheticFrame out;
   out.q_rad = posture.q_rad;
   out.X_WM.linear() = posture.R_WM;
-  out.X_WM.translation() = posture.p_W_wrist - posture.R_WM * model_.rest_joints_M()[0];
+  out.X_WM.translation() = posture.p_W_wrist - posture.R_WM * model_.rest_joints()[0];
   out.X_WH = out.X_WM * X_MH_;
 
   MarkerFrame& markers = out.markers;
@@ -161,18 +160,18 @@ SyntheticFrame SyntheticMotion::frame(std::size_t k) const noexcept {
   markers.t_capture = TimePoint{from_seconds(static_cast<double>(k + 1) / config_.rate_hz)};
   markers.t_arrival = markers.t_capture;
   markers.count = kSlots;
-  const std::array<Vector3d, 3> triad = triad_H();
-  for (std::size_t i = 0; i < 3; ++i) markers.markers[i].p_W = out.X_WH * triad[i];
+  const std::array<Vector3d, 3> p_H = triad();
+  for (std::size_t i = 0; i < 3; ++i) markers.markers[i].p_W = out.X_WH * p_H[i];
   for (std::size_t f = 0; f < kFingers; ++f) {
     const Vector9 q = out.q_rad.segment<9>(static_cast<Eigen::Index>(kFingerOffset[f]));
     const std::array<Vector3d, 2> p_M = model_.finger_points(static_cast<Finger>(f), q);
     for (std::size_t point = 0; point < 2; ++point) markers.markers[3 + 2 * f + point].p_W = out.X_WM * p_M[point];
   }
-  if (t_s >= kRingStepFrom_s) markers.markers[kRingTip].p_W += posture.R_WM * vector(kRingStep_M);
+  if (t_s >= kRingStepSeconds) markers.markers[kRingTip].p_W += posture.R_WM * vector(kRingStepMetres);
   for (std::size_t slot = 0; slot < kSlots; ++slot) {
     Marker& marker = markers.markers[slot];
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      marker.p_W(static_cast<Eigen::Index>(axis)) += kNoise_m * normal(config_.seed, k, 3 * slot + axis);
+      marker.p_W(static_cast<Eigen::Index>(axis)) += kNoiseMetres * normal(config_.seed, k, 3 * slot + axis);
     }
     marker.visible = !dropped(slot, k);
   }
@@ -184,14 +183,14 @@ bool SyntheticMotion::dropped(std::size_t slot, std::size_t k) const noexcept {
   const double t_s = static_cast<double>(k) / config_.rate_hz;
   if (slot == kThumbTip) {  // one gap in each of the windows into which the closed phase falls
     constexpr std::uint64_t kWindows = 2;
-    constexpr double kWindow_s = (kClosedTo_s - kClosedFrom_s) / kWindows;
-    const double since_closed_s = std::fmod(t_s, kCycle_s) - kClosedFrom_s;
-    if (since_closed_s < 0.0 || since_closed_s >= kWindow_s * kWindows) return false;
-    const auto window = static_cast<std::uint64_t>(since_closed_s / kWindow_s);
-    const std::uint64_t id = kWindows * static_cast<std::uint64_t>(t_s / kCycle_s) + window;
+    constexpr double kWindowSeconds = (kClosedToSeconds - kClosedFromSeconds) / kWindows;
+    const double since_closed_s = std::fmod(t_s, kCycleSeconds) - kClosedFromSeconds;
+    if (since_closed_s < 0.0 || since_closed_s >= kWindowSeconds * kWindows) return false;
+    const auto window = static_cast<std::uint64_t>(since_closed_s / kWindowSeconds);
+    const std::uint64_t id = kWindows * static_cast<std::uint64_t>(t_s / kCycleSeconds) + window;
     const double length_s = 0.16 + 0.41 * uniform(config_.seed, kGapStream, 2 * id);
     const double start_s = 0.3 + 0.8 * uniform(config_.seed, kGapStream, 2 * id + 1);
-    const double in_window_s = since_closed_s - kWindow_s * static_cast<double>(window);
+    const double in_window_s = since_closed_s - kWindowSeconds * static_cast<double>(window);
     return in_window_s >= start_s && in_window_s < start_s + length_s;
   }
   // One drop-out of one of the other finger markers in each 64 frames.

@@ -10,7 +10,7 @@
 
 namespace embody::config {
 
-inline constexpr std::size_t kMaxConfigBytes = 64 * 1024;  ///< of one file; a larger one is refused
+inline constexpr std::size_t kMaxConfigBytes = std::size_t{64} * 1024;  ///< of one file; a larger one is refused
 
 /// The main configuration file: `given` (from --config) if not empty, else $EMBODY_CONFIG, /etc/embody/embody.toml,
 /// <folder of the program>/../share/embody/embody.toml, the source tree's config/embody.toml. A file that is named but

@@ -15,7 +15,7 @@
 namespace embody::control {
 namespace {
 
-constexpr std::size_t kMaxResponseBytes = 1024 * 1024;
+constexpr std::size_t kMaxResponseBytes = std::size_t{1024} * 1024;
 
 Error connect_error(const std::string& path, int number) {
   if (number == EACCES || number == EPERM) {
@@ -82,7 +82,7 @@ Result<std::string> ControlClient::read_line(TimePoint deadline) {
     if (in_.size() > kMaxResponseBytes) {
       return make_error(Errc::kMalformed, "%.100s answers without an end: it is not embodyd", path_.c_str());
     }
-    std::array<std::byte, 16 * 1024> buffer;
+    std::array<std::byte, std::size_t{16} * 1024> buffer;
     const auto received = transport::receive(fd_.get(), buffer);
     if (received.status == IoStatus::kDisconnected) return lost();
     if (received.status == IoStatus::kDone) {

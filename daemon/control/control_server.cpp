@@ -19,8 +19,8 @@ namespace {
 using transport::UniqueFd;
 
 constexpr std::size_t kMaxClients = 16;
-constexpr std::size_t kMaxUnreadBytes = 256 * 1024;
-constexpr std::size_t kReadBytes = 16 * 1024;  // per client and call
+constexpr std::size_t kMaxUnreadBytes = std::size_t{256} * 1024;
+constexpr std::size_t kReadBytes = std::size_t{16} * 1024;  // per client and call
 
 struct Client {
   UniqueFd fd;

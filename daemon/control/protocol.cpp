@@ -11,8 +11,8 @@ using Ordered = nlohmann::ordered_json;  // answers of the daemon keep its order
 
 constexpr std::array<const char*, 7> kCommands{"status", "engage",   "disengage", "stop",
                                                "reset",  "shutdown", "subscribe"};
-constexpr std::int64_t kShortestInterval_ms = 20;
-constexpr std::int64_t kLongestInterval_ms = 60'000;
+constexpr std::int64_t kShortestIntervalMs = 20;
+constexpr std::int64_t kLongestIntervalMs = 60'000;
 
 std::string dump(const Ordered& value) {
   return value.dump(-1, ' ', false, Ordered::error_handler_t::replace);
@@ -52,7 +52,7 @@ Status read_member(const std::string& key, const json& value, Request& request, 
     }
     request.id = value.get<std::int64_t>();
   } else if (key == "interval_ms") {
-    if (!value.is_number_integer() || value < kShortestInterval_ms || value > kLongestInterval_ms) {
+    if (!value.is_number_integer() || value < kShortestIntervalMs || value > kLongestIntervalMs) {
       return malformed("interval_ms must be a whole number from 20 to 60000");
     }
     request.interval = std::chrono::milliseconds(value.get<std::int64_t>());

@@ -13,8 +13,9 @@
 
 namespace embody::control {
 
-inline constexpr int kProtocol = 1;                      ///< version of the messages
-inline constexpr std::size_t kMaxLineBytes = 64 * 1024;  ///< of a request; a longer line ends the connection
+inline constexpr int kProtocol = 1;  ///< version of the messages
+inline constexpr std::size_t kMaxLineBytes =
+    std::size_t{64} * 1024;  ///< of a request; a longer line ends the connection
 
 enum class Command : std::uint8_t { kStatus, kEngage, kDisengage, kStop, kReset, kShutdown, kSubscribe };
 

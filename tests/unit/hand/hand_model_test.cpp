@@ -24,9 +24,9 @@ HandModel shaped(HandShape parameter, double value) {
 
 double length(const HandModel& model, Finger finger) {
   const std::size_t first = first_joint(finger);
-  const auto& joints = model.rest_joints_M();
+  const auto& joints = model.rest_joints();
   return (joints[first + 1] - joints[first]).norm() + (joints[first + 2] - joints[first + 1]).norm() +
-         (model.rest_tips_M()[static_cast<std::size_t>(finger)] - joints[first + 2]).norm();
+         (model.rest_tips()[static_cast<std::size_t>(finger)] - joints[first + 2]).norm();
 }
 
 class HandModelOfEachSkeleton : public testing::TestWithParam<Skeleton> {};
@@ -34,8 +34,8 @@ INSTANTIATE_TEST_SUITE_P(Skeletons, HandModelOfEachSkeleton, testing::Values(Ske
 
 TEST_P(HandModelOfEachSkeleton, IsAnAdultRightHandInManosFrame) {
   const HandModel model = model_of(GetParam());
-  const auto& joints = model.rest_joints_M();
-  const auto& tips = model.rest_tips_M();
+  const auto& joints = model.rest_joints();
+  const auto& tips = model.rest_tips();
   EXPECT_LT((joints[0] - Vector3d(.0957, .0064, .0062)).norm(), 1e-12);
   EXPECT_NEAR((tips[2] - joints[0]).norm(), .1905, .001) << "hand length";
   for (const Vector3d& tip : tips) EXPECT_LT(tip.x(), joints[0].x()) << "fingers point to -x";
@@ -48,11 +48,11 @@ TEST_P(HandModelOfEachSkeleton, PutsTheMarkersOnTheBackOfTheFingers) {
   for (std::size_t f = 0; f < kFingers; ++f) {
     const auto finger = static_cast<Finger>(f);
     const auto p_M = model.finger_points(finger, Vector9::Zero());
-    const Vector3d& joint = model.rest_joints_M()[first_joint(finger) + model.joints_moving(finger, 1) - 1];
-    EXPECT_LT((p_M[0] - model.rest_tips_M()[f]).norm(), .030) << kFingerNames[f] << " tip";
+    const Vector3d& joint = model.rest_joints()[first_joint(finger) + model.joints_moving(finger, 1) - 1];
+    EXPECT_LT((p_M[0] - model.rest_tips()[f]).norm(), .030) << kFingerNames[f] << " tip";
     EXPECT_LT((p_M[1] - joint).norm(), .050) << kFingerNames[f] << " middle";
     EXPECT_GT(p_M[1].y(), joint.y()) << kFingerNames[f] << " middle";
-    EXPECT_GT(p_M[0].y(), model.rest_tips_M()[f].y() + .006) << kFingerNames[f] << " tip";
+    EXPECT_GT(p_M[0].y(), model.rest_tips()[f].y() + .006) << kFingerNames[f] << " tip";
   }
 }
 
@@ -119,7 +119,7 @@ TEST_P(HandModelOfEachSkeleton, FingerPointsMoveWithTheJointThatCarriesThem) {
 TEST(HandModel, JointPosesFormManosTree) {
   const HandModel model;
   test::RandomValues random(44);
-  const auto& rest = model.rest_joints_M();
+  const auto& rest = model.rest_joints();
   const Vector48 q = random.vector<48>(-1.0, 1.0);
   const auto X_MJ = model.joint_poses(q);
   for (std::size_t k = 1; k < kHandModelJoints; ++k) {
@@ -143,11 +143,11 @@ TEST(HandModel, PositiveRotationAboutZFlexesTheFingers) {
 
 TEST(HandModelShape, ZeroIsTheReferenceAndScaleScalesEverythingAboutTheWrist) {
   const HandModel reference, big = shaped(HandShape::kScale, 0.1);
-  const Vector3d wrist = reference.rest_joints_M()[0];
-  EXPECT_EQ(big.rest_joints_M()[0], wrist);
+  const Vector3d wrist = reference.rest_joints()[0];
+  EXPECT_EQ(big.rest_joints()[0], wrist);
   for (std::size_t f = 0; f < kFingers; ++f) {
     const auto finger = static_cast<Finger>(f);
-    EXPECT_LT((big.rest_tips_M()[f] - wrist - 1.1 * (reference.rest_tips_M()[f] - wrist)).norm(), 1e-12);
+    EXPECT_LT((big.rest_tips()[f] - wrist - 1.1 * (reference.rest_tips()[f] - wrist)).norm(), 1e-12);
     for (std::size_t point = 0; point < 2; ++point) {
       const Vector3d p = reference.finger_points(finger, Vector9::Zero())[point];
       EXPECT_LT((big.finger_points(finger, Vector9::Zero())[point] - wrist - 1.1 * (p - wrist)).norm(), 1e-12);
@@ -164,7 +164,7 @@ TEST(HandModelShape, EachFingerLengthChangesItsFingerOnly) {
       const auto finger = static_cast<Finger>(g);
       const double factor = f == g ? 1.2 : 1.0;
       EXPECT_NEAR(length(model, finger), factor * length(reference, finger), 1e-12) << f << " " << g;
-      EXPECT_EQ(model.rest_joints_M()[first_joint(finger)], reference.rest_joints_M()[first_joint(finger)]);
+      EXPECT_EQ(model.rest_joints()[first_joint(finger)], reference.rest_joints()[first_joint(finger)]);
     }
   }
 }
@@ -172,21 +172,21 @@ TEST(HandModelShape, EachFingerLengthChangesItsFingerOnly) {
 TEST(HandModelShape, PalmGirthAndDistalLengthChangeWhatTheirNamesSay) {
   const HandModel reference, broad = shaped(HandShape::kPalmBreadth, 0.1), deep = shaped(HandShape::kPalmLength, 0.1);
   const HandModel thick = shaped(HandShape::kGirth, 0.1), distal = shaped(HandShape::kDistalLength, 0.1);
-  const auto& joints = reference.rest_joints_M();
-  const auto breadth = [](const HandModel& m) { return m.rest_joints_M()[1].z() - m.rest_joints_M()[7].z(); };
+  const auto& joints = reference.rest_joints();
+  const auto breadth = [](const HandModel& m) { return m.rest_joints()[1].z() - m.rest_joints()[7].z(); };
   EXPECT_NEAR(breadth(broad), 1.1 * breadth(reference), 1e-12);
-  EXPECT_NEAR(deep.rest_joints_M()[4].x() - joints[0].x(), 1.1 * (joints[4].x() - joints[0].x()), 1e-12);
+  EXPECT_NEAR(deep.rest_joints()[4].x() - joints[0].x(), 1.1 * (joints[4].x() - joints[0].x()), 1e-12);
   for (std::size_t f = 0; f < kFingers; ++f) {
     const auto finger = static_cast<Finger>(f);
     const std::size_t last = first_joint(finger) + 2;
     EXPECT_NEAR(length(broad, finger), length(reference, finger), 1e-12);
     EXPECT_NEAR(length(thick, finger), length(reference, finger), 1e-12);
-    EXPECT_NEAR((distal.rest_tips_M()[f] - distal.rest_joints_M()[last]).norm(),
-                1.1 * (reference.rest_tips_M()[f] - joints[last]).norm(), 1e-12);
+    EXPECT_NEAR((distal.rest_tips()[f] - distal.rest_joints()[last]).norm(),
+                1.1 * (reference.rest_tips()[f] - joints[last]).norm(), 1e-12);
     // The marker's distance from the bone grows with the girth.
-    const Vector3d bone = (reference.rest_tips_M()[f] - joints[last]).normalized();
+    const Vector3d bone = (reference.rest_tips()[f] - joints[last]).normalized();
     const auto off_bone = [&](const HandModel& m) {
-      const Vector3d p = m.finger_points(finger, Vector9::Zero())[0] - m.rest_joints_M()[last];
+      const Vector3d p = m.finger_points(finger, Vector9::Zero())[0] - m.rest_joints()[last];
       return (p - p.dot(bone) * bone).norm();
     };
     EXPECT_NEAR(off_bone(thick), 1.1 * off_bone(reference), 1e-12);

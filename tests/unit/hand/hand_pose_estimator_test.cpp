@@ -89,7 +89,8 @@ TEST(HandFrame, RefusesTriadsThatSpanNoPlane) {
       {"not a number", Vector3d(kNan, 0, 0), right + other, right},
       {"infinite", Vector3d(kInfinity, 0, 0), right + other, right},
       {"infinite origin", right + along, right + other, Vector3d(0, kInfinity, 0)},
-      {"overflow", Vector3d(1e200, 0, 0), Vector3d(0, 1e200, 0), right},
+      {"overflowing edges", Vector3d(1e200, 0, 0), Vector3d(0, 1e200, 0), right},
+      {"overflowing normal", Vector3d(1e150, 0, 0), Vector3d(0, 1e150, 0), right},
   };
   for (const auto& c : cases) {
     Pose X_WH = math::pose_from({1, 2, 3}, {.1, .2, .3});

@@ -51,7 +51,7 @@ std::vector<MarkerFrame> read_recording(const char* path, const hand::GloveLayou
 }
 
 MarkerFrame first_real_frame() {
-  constexpr double kPoints_m[13][3] = {
+  constexpr double kPointsMetres[13][3] = {
       {.110406, .135075, .460584}, {.062382, .161390, .450921}, {.066512, .130409, .452779},
       {.141316, .248687, .391455}, {.112068, .229996, .401035}, {.225936, .199537, .481317},
       {.166580, .184360, .481888}, {.241221, .143006, .477943}, {.176320, .155042, .476936},
@@ -63,7 +63,7 @@ MarkerFrame first_real_frame() {
   frame.t_arrival = TimePoint{std::chrono::milliseconds(14)};
   frame.count = 13;
   for (std::size_t slot = 0; slot < 13; ++slot) {
-    frame.markers[slot] = {{kPoints_m[slot][0], kPoints_m[slot][1], kPoints_m[slot][2]}, true};
+    frame.markers[slot] = {{kPointsMetres[slot][0], kPointsMetres[slot][1], kPointsMetres[slot][2]}, true};
   }
   return frame;
 }

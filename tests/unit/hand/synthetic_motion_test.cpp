@@ -81,18 +81,19 @@ TEST(SyntheticMotion, StartsLikeTheRealRecording) {
 TEST(SyntheticMotion, MovesSmoothlyWithinHumanSpeedsAndTheRealVolume) {
   const HandModel model;
   const auto frames = all_frames(SyntheticMotion());
-  const Vector3d wrist = model.rest_joints_M()[0];
-  constexpr double kPeriod_s = 0.01;
+  const Vector3d wrist = model.rest_joints()[0];
+  constexpr double kPeriodSeconds = 0.01;
   double speed_m_s = 0.0, turn_rad_s = 0.0, jump_m_s2 = 0.0, tilt_rad = 0.0, finger_rad_s = 0.0;
   Vector3d last_velocity = Vector3d::Zero();
   for (std::size_t k = 1; k < frames.size(); ++k) {
     const Pose &X_a = frames[k - 1].X_WM, &X_b = frames[k].X_WM;
-    const Vector3d velocity = (X_b * wrist - X_a * wrist) / kPeriod_s;
+    const Vector3d velocity = (X_b * wrist - X_a * wrist) / kPeriodSeconds;
     speed_m_s = std::max(speed_m_s, velocity.norm());
-    jump_m_s2 = std::max(jump_m_s2, (velocity - last_velocity).norm() / kPeriod_s);
-    turn_rad_s = std::max(turn_rad_s, math::angle_between(X_a.linear(), X_b.linear()) / kPeriod_s);
+    jump_m_s2 = std::max(jump_m_s2, (velocity - last_velocity).norm() / kPeriodSeconds);
+    turn_rad_s = std::max(turn_rad_s, math::angle_between(X_a.linear(), X_b.linear()) / kPeriodSeconds);
     tilt_rad = std::max(tilt_rad, math::angle_between(frames[0].X_WM.linear(), X_b.linear()));
-    finger_rad_s = std::max(finger_rad_s, (frames[k].q_rad - frames[k - 1].q_rad).cwiseAbs().maxCoeff() / kPeriod_s);
+    finger_rad_s =
+        std::max(finger_rad_s, (frames[k].q_rad - frames[k - 1].q_rad).cwiseAbs().maxCoeff() / kPeriodSeconds);
     last_velocity = velocity;
     for (std::size_t slot = 0; slot < 13; ++slot) {
       const Vector3d& p_W = frames[k].markers.markers[slot].p_W;

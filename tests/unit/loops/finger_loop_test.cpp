@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "core/hand/synthetic_motion.hpp"
 #include "daemon/app/config_io.hpp"
 #include "daemon/app/models.hpp"
@@ -25,8 +27,8 @@ Models shipped_models() {
 /// A finger loop with the shipped models, and a synthetic hand to feed it.
 class FingerBench {
  public:
-  explicit FingerBench(const FingerLoopConfig& config = {})
-      : models(shipped_models()), loop(models.fingers, models.embodiment, config, edges) {}
+  explicit FingerBench(const SlowDown& slow_down = {})
+      : models(shipped_models()), loop(models.fingers, models.embodiment, slow_down, edges) {}
 
   void publish(std::size_t k) {
     TrackedFrame tracked;
@@ -81,10 +83,7 @@ TEST(FingerLoop, TakesTheNewestFrameAndCountsTheOnesItPassesOver) {
 }
 
 TEST(FingerLoop, ComputesForHalfOfTheTimeAtMost) {
-  FingerLoopConfig slow;
-  slow.slow_down = milliseconds(20);
-  slow.slow_down_spins = true;
-  FingerBench bench(slow);
+  FingerBench bench({milliseconds(20), true});
   const TimePoint start = now();
   test::WatchedThread thread([&] { bench.loop.run(); });
   for (std::size_t k = 0; now() - start < milliseconds(800); ++k) {

@@ -5,6 +5,8 @@
 
 #include <array>
 #include <atomic>
+#include <optional>
+#include <utility>
 
 namespace embody {
 namespace {

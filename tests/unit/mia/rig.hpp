@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "drivers/mia/mia_hand.hpp"
@@ -18,6 +20,12 @@ using std::chrono::milliseconds;
 inline mia::MiaConfig patient_config() {
   mia::MiaConfig config;
   config.ack_timeout = milliseconds(150);  // tests of other things must not trip over a busy machine
+  return config;
+}
+
+inline mia::MiaConfig quick_config() {
+  mia::MiaConfig config;
+  config.ack_timeout = milliseconds(20);
   return config;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 // An arm controller in a cell like the demo's, driven at 500 Hz in virtual time by a hand that is tracked at 100 Hz.
+#include <cmath>
 #include <functional>
+#include <string>
 
 #include "core/teleop/arm_controller.hpp"
 
@@ -35,9 +37,6 @@ class ArmRig {
 
   /// Hand poses up to the present, and half a second of them before the start.
   void feed() {
-    if (next_frame_s_ < -0.4) {
-      while (next_frame_s_ < now_s) add_frame();
-    }
     while (next_frame_s_ <= now_s) add_frame();
   }
   [[nodiscard]] TimePoint now() const { return TimePoint{std::chrono::seconds(100)} + from_seconds(now_s); }

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "tests/unit/math/random_values.hpp"
 
 namespace embody::teleop {
@@ -37,7 +35,7 @@ TEST(ClockMap, KeepsTheSpacingOfTheDeviceWhateverTheDelays) {
                              random(0.0, 1.0) < 0.2 ? Duration(from_seconds(random(0.0, 0.030))) : Duration{0});
     const TimePoint mapped = map.map(device.time, arrival);
     ASSERT_LE(mapped, arrival) << "from the future";
-    ASSERT_LT(std::abs((mapped - last - milliseconds(2)).count()), microseconds(20).count()) << "message " << i;
+    ASSERT_LT(std::chrono::abs(mapped - last - milliseconds(2)), microseconds(20)) << "message " << i;
     last = mapped;
   }
 }
