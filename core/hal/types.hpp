@@ -55,6 +55,7 @@ struct HandPose {
   Pose X_WM{Pose::Identity()};  ///< base of the hand model
   bool valid{false};            ///< false: the poses are the last valid ones
   std::uint32_t streak{0};      ///< valid, plausible poses in a row up to this one, without a gap in time
+  std::uint32_t jumps{0};       ///< times that a sudden but lasting change of pose was accepted
 };
 
 enum class FingerQuality : std::uint8_t {
@@ -63,6 +64,12 @@ enum class FingerQuality : std::uint8_t {
   kCapped,   ///< iteration cap reached; best point so far
   kHeld,     ///< no marker of this finger visible; angles of an earlier frame
 };
+
+[[nodiscard]] inline std::array<std::array<Eigen::Vector3d, 2>, kFingers> zero_points() noexcept {
+  std::array<std::array<Eigen::Vector3d, 2>, kFingers> points;  // Eigen leaves value-initialised vectors unset
+  for (auto& finger : points) finger.fill(Eigen::Vector3d::Zero());
+  return points;
+}
 
 /// State of the human hand in MANO's parametrisation.
 struct HandState {
@@ -74,7 +81,7 @@ struct HandState {
   Eigen::Matrix<double, static_cast<int>(kHandAngles), 1> q_rad{
       Eigen::Matrix<double, static_cast<int>(kHandAngles), 1>::Zero()};  ///< axis-angle, MANO's order
   /// Model points that correspond to the markers, in M (m): [finger][0] tip, [finger][1] middle.
-  std::array<std::array<Eigen::Vector3d, 2>, kFingers> p_M{};
+  std::array<std::array<Eigen::Vector3d, 2>, kFingers> p_M = zero_points();
   std::array<double, kFingers> residual_m{};  ///< mean distance of visible markers to their model points
   std::array<std::uint8_t, kFingers> visible_markers{};
   std::array<FingerQuality, kFingers> quality{};

@@ -53,7 +53,7 @@ const char* to_string(Cause cause) noexcept {
       "emergency stop of the robot",
       "safety fault of the robot",
       "robot hand not connected",
-      "hand pose not valid",
+      "sudden jump of the hand pose",
       "watchdog found a hung loop",
       "shutting down",
   };
@@ -96,7 +96,9 @@ void ModeMachine::check_faults(TimePoint now, const Health& health) noexcept {
   if (health.watchdog_bit) return enter(Mode::kStopped, Cause::kWatchdog, now);
   if (arm != Cause::kNone && (active || latching)) return enter(Mode::kStopped, arm, now);
   if (active && !health.hand_connected) return enter(Mode::kStopped, Cause::kHandLost, now);
-  if (is_moving_mode(state_.mode) && !health.arm_following) enter(Mode::kHolding, Cause::kArmNotFollowing, now);
+  if (!is_moving_mode(state_.mode)) return;
+  if (!health.arm_following) return enter(Mode::kHolding, Cause::kArmNotFollowing, now);
+  if (health.hand_jumped) enter(Mode::kHolding, Cause::kHandPoseJumped, now);
 }
 
 /// Late or unusable input: brake, go on if it comes back at once, otherwise hold, and stop when it stays away.

@@ -31,7 +31,7 @@ enum class Cause : std::uint8_t {
   kEmergencyStop,
   kArmFault,
   kHandLost,
-  kHandPoseInvalid,
+  kHandPoseJumped,
   kWatchdog,
   kShutdown,
 };
@@ -57,6 +57,7 @@ struct Health {
   bool arm_following{true};  ///< false: engaged, but the robot's program does not track
   bool arm_at_rest{true};    ///< our own set-point stands still
   bool hand_connected{false};
+  bool hand_jumped{false};       ///< since engaging, the hand pose made a jump that no hand can make
   bool target_reachable{false};  ///< inside the workspace and the arm's reach
   bool watchdog_bit{false};      ///< a loop was found hung
 };

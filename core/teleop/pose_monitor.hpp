@@ -6,7 +6,7 @@ namespace embody::teleop {
 
 /// Marks poses that no hand can have reached since the last one as not valid, and counts good poses in a row. A sudden
 /// but lasting change (a new measurement, markers re-identified) is accepted once `kAcceptAfter` poses agree on it; the
-/// streak then starts anew, so whoever waits for a streak waits again.
+/// streak then starts anew and `jumps` counts it, so that no motion goes on across a jump.
 class PoseMonitor {
  public:
   void step(HandPose& pose) noexcept {
@@ -23,9 +23,13 @@ class PoseMonitor {
       suspect_ = pose;
       streak_ = 0;
       pose.valid = false;
-      if (suspects_ >= kAcceptAfter) started_ = false;
+      if (suspects_ >= kAcceptAfter) {
+        started_ = false;
+        ++jumps_;
+      }
     }
     pose.streak = streak_;
+    pose.jumps = jumps_;
   }
 
  private:
@@ -49,6 +53,7 @@ class PoseMonitor {
   bool started_{false};
   std::uint32_t suspects_{0};
   std::uint32_t streak_{0};
+  std::uint32_t jumps_{0};
 };
 
 }  // namespace embody::teleop

@@ -202,8 +202,11 @@ safety::ModeState Daemon::mode() {
   return edges_.mode_to_main.get();
 }
 
-bool Daemon::healthy() const {
-  return !edges_.watchdog_bit.load(std::memory_order_relaxed);
+bool Daemon::healthy() {
+  const std::uint64_t rounds = edges_.heartbeats.watchdog.load(std::memory_order_relaxed);
+  const bool alive = rounds != last_watchdog_;
+  last_watchdog_ = rounds;
+  return alive && !edges_.watchdog_bit.load(std::memory_order_relaxed);
 }
 
 }  // namespace embody

@@ -46,8 +46,9 @@ class Daemon {
   Decision request(safety::RequestKind kind);
   /// Newest mode. Call from one thread only, the one that calls request().
   safety::ModeState mode();
-  /// False when the watchdog found a hung loop or the watchdog itself is silent.
-  [[nodiscard]] bool healthy() const;
+  /// False when the watchdog found a hung loop, or has not come round itself since the last call. Call it at intervals
+  /// of several watchdog periods (50 ms), from one thread.
+  [[nodiscard]] bool healthy();
   [[nodiscard]] bool ever_connected() const { return links_->ever_connected(); }
   [[nodiscard]] std::vector<DeviceReport> devices() const { return links_->reports(); }
   /// Everything that `embodyctl status` shows, as one JSON object.
@@ -79,6 +80,7 @@ class Daemon {
   RealtimeReport realtime_;
   TimePoint t_start_{};
   std::uint32_t request_id_{0};
+  std::uint64_t last_watchdog_{0};
   bool running_{false};
   Thread links_thread_, telemetry_thread_, arm_thread_, hand_thread_, finger_thread_, tracker_thread_, watchdog_thread_;
 };

@@ -68,7 +68,7 @@ void set_up_log(config::LogLevel level) {
 int serve(Daemon& daemon, control::ControlServer& server, const bool& shutdown, StopSignals& signals,
           const config::LinksConfig& links) {
   const TimePoint t_start = transport::now();
-  TimePoint t_notified{};
+  TimePoint t_health{};
   while (true) {
     pollfd entries[2] = {{signals.fd(), POLLIN, 0}, {server.fd(), POLLIN, 0}};
     ::poll(entries, 2, 100);
@@ -79,9 +79,9 @@ int serve(Daemon& daemon, control::ControlServer& server, const bool& shutdown, 
     server.serve();
     if (shutdown) return kExitOk;
     const TimePoint t = transport::now();
-    if (daemon.healthy() && t - t_notified > std::chrono::milliseconds(300)) {
-      ::sd_notify(0, "WATCHDOG=1");
-      t_notified = t;
+    if (t - t_health > std::chrono::milliseconds(300)) {
+      if (daemon.healthy()) ::sd_notify(0, "WATCHDOG=1");
+      t_health = t;
     }
     if (links.on_missing == config::OnMissing::kExit && !daemon.ever_connected() &&
         t - t_start > links.missing_timeout) {

@@ -62,6 +62,7 @@ void ArmLoop::take_pose() noexcept {
   pose_is_new_ = true;
   const HandPose& pose = edges_.pose_to_arm.get();
   streak_ = pose.streak;
+  jumps_ = pose.jumps;
   if (!pose.valid) return;
   t_pose_ = pose.t_capture;
   controller_.add(pose.t_capture, pose.X_WM);
@@ -97,6 +98,7 @@ void ArmLoop::step_modes(TimePoint t) noexcept {
   health.arm_following = arm_following(t);
   health.arm_at_rest = controller_.at_rest();
   health.hand_connected = edges_.hand_ready.load(std::memory_order_relaxed);
+  health.hand_jumped = jumps_ != jumps_engaged_;
   health.target_reachable = reachable_;
   health.watchdog_bit = edges_.watchdog_bit.load(std::memory_order_relaxed);
   safety::Request request;
@@ -105,6 +107,7 @@ void ArmLoop::step_modes(TimePoint t) noexcept {
   const Mode before = machine_.state().mode;
   report_.mode = machine_.step(t, asked ? &request : nullptr, health);
   if (report_.mode.mode == Mode::kEngaged && before != Mode::kEngaged) engage_pending_ = true;
+  if (!is_moving_mode(report_.mode.mode)) jumps_engaged_ = jumps_;
   if (is_moving_mode(report_.mode.mode) && !was_moving) tracked_ = false;
   edges_.mode_to_hand.publish(report_.mode);
   edges_.mode_to_main.publish(report_.mode);

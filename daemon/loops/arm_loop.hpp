@@ -51,7 +51,9 @@ class ArmLoop {
   bool reachable_{false};
   TimePoint t_pose_{};  // capture time of the newest usable pose
   std::uint32_t streak_{0};
-  bool pose_is_new_{false};  // not yet in a command
+  std::uint32_t jumps_{0};
+  std::uint32_t jumps_engaged_{0};  // when motion began
+  bool pose_is_new_{false};         // not yet in a command
   std::uint32_t sequence_{0};
 };
 

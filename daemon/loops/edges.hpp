@@ -83,6 +83,7 @@ struct Heartbeats {
   std::atomic<std::uint64_t> tracker{0};
   std::atomic<std::uint64_t> hand{0};
   std::atomic<std::uint64_t> fingers{0};
+  std::atomic<std::uint64_t> watchdog{0};
 };
 
 struct Edges {

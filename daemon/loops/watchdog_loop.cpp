@@ -13,6 +13,7 @@ void WatchdogLoop::run() noexcept {
   TimePoint t_last = transport::now();
   while (!edges_.stop.load(std::memory_order_relaxed)) {
     wait_for_input(-1, -1, kPeriod);
+    edges_.heartbeats.watchdog.fetch_add(1, std::memory_order_relaxed);
     const TimePoint t = transport::now();
     // When this highest thread itself was late, the whole machine stood still: that says nothing about the loops.
     if (t - t_last > 2 * kPeriod) arm = tracker = hand = {};

@@ -10,7 +10,7 @@
 #include "core/teleop/clock_map.hpp"
 #include "drivers/qualisys/parameters.hpp"
 #include "drivers/qualisys/rt_connection.hpp"
-#include "drivers/recording/marker_names.hpp"
+#include "core/base/names.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
 
@@ -42,7 +42,7 @@ Status check_setup(const Parameters& parameters, const std::vector<std::string>&
     return make_error(Errc::kRefused, "QTM's upward axis is '%.20s', it must be '+Z'; change it in QTM's calibration",
                       parameters.axis_upwards.c_str());
   }
-  const auto missing = recording::describe_missing(names, parameters.labels, 150);
+  const auto missing = describe_missing(names, parameters.labels, 150);
   if (missing.empty()) return {};
   return make_error(Errc::kNotFound, "QTM has no marker(s) %s; name them in QTM or choose another glove",
                     missing.c_str());

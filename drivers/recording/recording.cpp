@@ -1,6 +1,6 @@
 #include "drivers/recording/recording.hpp"
 
-#include "drivers/recording/marker_names.hpp"
+#include "core/base/names.hpp"
 
 namespace embody::recording {
 

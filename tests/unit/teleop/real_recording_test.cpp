@@ -77,7 +77,7 @@ double percentile_95(std::vector<double> values) {
   return *nth;
 }
 
-struct Run {
+struct Drive {
   std::string broken;  ///< first limit that a set-point broke
   int unreachable{0};
   int flips{0};
@@ -86,13 +86,13 @@ struct Run {
   std::vector<std::pair<TimePoint, Pose>> flange;  ///< FK of the set-points, each 10 ms from 3 s on
 };
 
-Run drive(const ArmControllerConfig& config, const std::vector<Sample>& samples) {
+Drive drive(const ArmControllerConfig& config, const std::vector<Sample>& samples) {
   Pose X_start = samples.front().X_BE;
   X_start.translation() += Eigen::Vector3d(-0.05, 0.03, 0.08);
   const Vector6 q_start = *robot::solve_nearest(X_start, test::usual_posture());
   ArmController controller(config);
   test::LimitCheck check(config.joints, q_start);
-  Run run;
+  Drive run;
   std::size_t next = 0;
   Pose last = X_start;
   const int ticks = static_cast<int>(to_seconds(samples.back().t - kStart) / kTick_s);
@@ -129,7 +129,7 @@ struct Error {
 };
 
 /// At the constant lag that makes the position error smallest.
-Error following_error(const Run& run, const std::vector<Sample>& samples) {
+Error following_error(const Drive& run, const std::vector<Sample>& samples) {
   Error best;
   for (Duration lag{0}; lag <= milliseconds(250); lag += milliseconds(5)) {
     std::vector<double> distance;
@@ -170,7 +170,7 @@ TEST_F(RealRecording, EveryFrameIsAPlausibleHand) {
 TEST_F(RealRecording, IsFollowedInsideTheLimitsOfTheDemo) {
   arm.speed_m_s = 0.6;
   arm.speed_rad_s = 2.5;
-  const Run run = drive(arm, samples);
+  const Drive run = drive(arm, samples);
   const Error error = following_error(run, samples);
   std::printf("limits of the demo: lag %.0f ms, p95 %.2f mm and %.4f rad; flange at most %.3f m/s, %.3f rad/s\n",
               to_seconds(error.lag) * 1e3, error.p95_m * 1e3, error.p95_rad, run.largest_speed_m_s,
@@ -184,7 +184,7 @@ TEST_F(RealRecording, IsFollowedInsideTheLimitsOfTheDemo) {
 }
 
 TEST_F(RealRecording, KeepsTheDefaultLimitsAlthoughTheHandIsFaster) {
-  const Run run = drive(arm, samples);
+  const Drive run = drive(arm, samples);
   const Error error = following_error(run, samples);
   std::printf("default limits: lag %.0f ms, p95 %.2f mm and %.4f rad; flange at most %.3f m/s, %.3f rad/s\n",
               to_seconds(error.lag) * 1e3, error.p95_m * 1e3, error.p95_rad, run.largest_speed_m_s,
@@ -200,7 +200,7 @@ TEST_F(RealRecording, DISABLED_NeverMovesTheFlangeFasterThanConfigured) {
     ArmControllerConfig config = arm;
     config.speed_m_s = 0.25 * scale;
     config.speed_rad_s = 1.0 * scale;
-    const Run run = drive(config, samples);
+    const Drive run = drive(config, samples);
     EXPECT_LE(run.largest_speed_m_s, 1.02 * config.speed_m_s);
     EXPECT_LE(run.largest_speed_rad_s, 1.02 * config.speed_rad_s);
   }

@@ -1,10 +1,10 @@
 #pragma once
-// Finding markers by name, and telling people what is missing.
+// Names that people type: the most similar one, and which are missing.
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace embody::recording {
+namespace embody {
 
 /// The name among `available` that differs least from `name` (edit distance, ignoring case and treating space, `-`,
 /// `.` and `_` alike), or empty when nothing is similar: more than a third of the letters would have to change.
@@ -15,4 +15,4 @@ namespace embody::recording {
 [[nodiscard]] std::string describe_missing(const std::vector<std::string>& wanted,
                                            const std::vector<std::string>& available, std::size_t max_size);
 
-}  // namespace embody::recording
+}  // namespace embody

@@ -1,9 +1,9 @@
-#include "drivers/recording/marker_names.hpp"
+#include "core/base/names.hpp"
 
 #include <algorithm>
 #include <numeric>
 
-namespace embody::recording {
+namespace embody {
 namespace {
 
 constexpr std::size_t kLongestCompared = 128;
@@ -74,4 +74,4 @@ std::string describe_missing(const std::vector<std::string>& wanted, const std::
   return text;
 }
 
-}  // namespace embody::recording
+}  // namespace embody
