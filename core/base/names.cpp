@@ -13,20 +13,10 @@ char fold(char c) noexcept {
   return c == ' ' || c == '-' || c == '.' ? '_' : c;
 }
 
-/// Levenshtein distance of the folded texts.
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (fold(a[i]) == fold(b[j]) ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
-    }
-  }
-  return row.back();
+std::string folded(std::string_view text) {
+  std::string result(text.substr(0, kLongestCompared));
+  std::transform(result.begin(), result.end(), result.begin(), fold);
+  return result;
 }
 
 std::vector<std::string_view> missing_names(const std::vector<std::string>& wanted,
@@ -40,12 +30,27 @@ std::vector<std::string_view> missing_names(const std::vector<std::string>& want
 
 }  // namespace
 
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+    }
+  }
+  return row.back();
+}
+
 std::string_view nearest_name(std::string_view name, const std::vector<std::string>& available) {
   std::string_view best;
   std::size_t best_distance = name.size() / 3 + 1;
-  name = name.substr(0, kLongestCompared);
+  const std::string wanted = folded(name);
   for (const auto& candidate : available) {
-    const auto found = distance(name, std::string_view(candidate).substr(0, kLongestCompared));
+    const auto found = edit_distance(wanted, folded(candidate));
     if (found < best_distance) {
       best_distance = found;
       best = candidate;

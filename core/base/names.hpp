@@ -6,6 +6,9 @@
 
 namespace embody {
 
+/// Levenshtein distance (insert, delete, replace) of two texts. Cost: product of their lengths.
+[[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
+
 /// The name among `available` that differs least from `name` (edit distance, ignoring case and treating space, `-`,
 /// `.` and `_` alike), or empty when nothing is similar: more than a third of the letters would have to change.
 [[nodiscard]] std::string_view nearest_name(std::string_view name, const std::vector<std::string>& available);

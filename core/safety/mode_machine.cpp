@@ -61,6 +61,7 @@ const char* to_string(Cause cause) noexcept {
 }
 
 const ModeState& ModeMachine::step(TimePoint now, const Request* request, const Health& health) noexcept {
+  if (state_.t == TimePoint{}) state_.t_since = now;
   state_.t = now;
   if (health.target_reachable || !is_moving_mode(state_.mode)) t_reachable_ = now;
   check_faults(now, health);

@@ -246,7 +246,8 @@ struct ControlConfig {
     v.field("socket", socket,
             "Path of the control socket. Empty: $RUNTIME_DIRECTORY/control.sock under systemd, else "
             "$XDG_RUNTIME_DIR/embody/control.sock, else /tmp/embody-UID/control.sock.");
-    v.field("group_access", group_access, "Let the group of the daemon use the socket (0660 instead of 0600).");
+    v.field("group_access", group_access,
+            "Let the group of the daemon use the socket (0660 instead of 0600); always so under systemd.");
   }
 };
 

@@ -2,29 +2,10 @@
 
 #include <algorithm>
 
+#include "core/base/names.hpp"
 #include "daemon/app/config_io.hpp"
 
 namespace embody::config {
-namespace {
-
-/// Edits (insert, delete, replace) between two words.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
-
 std::string table_text(const std::string& table) {
   return table.empty() ? "at the top of the file" : "in [" + table + "]";
 }

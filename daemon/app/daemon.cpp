@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <thread>
+#include <tuple>
 
 #include "daemon/app/heap_guard.hpp"
 #include "drivers/mia/mia_hand.hpp"
@@ -80,12 +81,20 @@ Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<std::
 }  // namespace
 
 Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& config) {
+  for (const auto& [key, name, known] : {std::tuple{"tracker", &config.tracker.driver, "qualisys"},
+                                         {"arm", &config.arm.driver, "ur_rtde"},
+                                         {"hand", &config.hand.driver, "mia"}}) {
+    if (*name == known) continue;
+    return make_error(Errc::kInvalidArgument, "[%s] driver = \"%s\" is unknown; this version has \"%s\"", key,
+                      name->c_str(), known);
+  }
   Result<Models> models = make_models(config);
   if (!models) return models.error();
   embody::DdsConfig dds;
   dds.enabled = config.dds.enabled;
   dds.domain = config.dds.domain;
   dds.interface = config.dds.interface;
+  dds.networks = config.dds.networks;
   dds.side = config::kSideNames[static_cast<std::size_t>(config.dds.side)];
   Result<DdsPublisher> publisher = DdsPublisher::create(dds);
   if (!publisher) return publisher.error();

@@ -100,7 +100,9 @@ int run(const config::EmbodyConfig& config) {
   if (!daemon) return fail(daemon.error(), kExitConfiguration);
 
   bool shutdown = false;
-  control::ServerConfig server_config{control::server_socket_path(config.control.socket), config.control.group_access};
+  // Under systemd the unit's group may command, by hand only the user (docs/control.md).
+  const bool group = config.control.group_access || std::getenv("RUNTIME_DIRECTORY") != nullptr;
+  control::ServerConfig server_config{control::server_socket_path(config.control.socket), group};
   Result<std::unique_ptr<control::ControlServer>> server =
       control::ControlServer::open(server_config, make_control_handler(**daemon, shutdown));
   if (!server) return fail(server.error(), exit_code_of(server.error()));

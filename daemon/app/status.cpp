@@ -9,7 +9,7 @@
 namespace embody {
 namespace {
 
-using nlohmann::json;
+using json = nlohmann::ordered_json;  // members appear in the order of the data path
 
 std::uint64_t value(const std::atomic<std::uint64_t>& counter) {
   return counter.load(std::memory_order_relaxed);
@@ -45,10 +45,12 @@ json counters_json(const Edges& edges, const TelemetrySnapshot& telemetry, const
 
 json latency_json(const TelemetrySnapshot& telemetry) {
   json stages = json::object();
-  for (const auto& [stage, histogram] : telemetry.latency) {
-    stages[stage] = {{"count", histogram.count()},           {"p50", histogram.quantile_us(0.5)},
-                     {"p90", histogram.quantile_us(0.9)},    {"p99", histogram.quantile_us(0.99)},
-                     {"p999", histogram.quantile_us(0.999)}, {"max", histogram.max_us()}};
+  for (std::size_t i = 0; i < kStageNames.size(); ++i) {
+    const Histogram& histogram = telemetry.latency[i];
+    if (histogram.count() == 0) continue;
+    stages[kStageNames[i]] = {{"count", histogram.count()},           {"p50", histogram.quantile_us(0.5)},
+                              {"p90", histogram.quantile_us(0.9)},    {"p99", histogram.quantile_us(0.99)},
+                              {"p999", histogram.quantile_us(0.999)}, {"max", histogram.max_us()}};
   }
   return stages;
 }

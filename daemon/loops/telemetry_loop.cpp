@@ -66,17 +66,17 @@ void TelemetryLoop::take() {
 void TelemetryLoop::take_timings() {
   ArmTiming arm;
   while (edges_.arm_timings.pop(arm)) {
-    data_.latency["decode"].add(arm.t_decoded - arm.t_arrival);
-    data_.latency["hand_pose"].add(arm.t_estimated - arm.t_decoded);
-    data_.latency["phase_wait"].add(arm.t_tick - arm.t_estimated);
-    data_.latency["arm"].add(arm.t_computed - arm.t_tick);
-    data_.latency["write"].add(arm.t_written - arm.t_computed);
-    data_.latency["total"].add(arm.t_written - arm.t_arrival);
+    latency(Stage::kDecode).add(arm.t_decoded - arm.t_arrival);
+    latency(Stage::kHandPose).add(arm.t_estimated - arm.t_decoded);
+    latency(Stage::kPhaseWait).add(arm.t_tick - arm.t_estimated);
+    latency(Stage::kArm).add(arm.t_computed - arm.t_tick);
+    latency(Stage::kWrite).add(arm.t_written - arm.t_computed);
+    latency(Stage::kTotal).add(arm.t_written - arm.t_arrival);
   }
   FingerTiming fingers;
   while (edges_.finger_timings.pop(fingers)) {
-    data_.latency["finger_wait"].add(fingers.t_taken - fingers.t_arrival);
-    data_.latency["fingers"].add(fingers.t_solved - fingers.t_taken);
+    latency(Stage::kFingerWait).add(fingers.t_taken - fingers.t_arrival);
+    latency(Stage::kFingerSolve).add(fingers.t_solved - fingers.t_taken);
     for (std::size_t i = 0; i < kFingers; ++i) {
       if (fingers.visible_markers[i] == 0) continue;
       residual_sum_m_[i] += fingers.residual_m[i];
@@ -161,9 +161,11 @@ void TelemetryLoop::publish_status() {
                      {"holds", data_.mode.holds}};
   sample.rates = {
       {"tracker", data_.tracker_hz}, {"arm", data_.arm_hz}, {"hand", data_.hand_hz}, {"fingers", data_.fingers_hz}};
-  for (const auto& [stage, histogram] : data_.latency) {
-    sample.latencies.push_back({stage, histogram.count(), histogram.quantile_us(0.5), histogram.quantile_us(0.99),
-                                histogram.quantile_us(0.999), histogram.max_us()});
+  for (std::size_t i = 0; i < kStageNames.size(); ++i) {
+    const Histogram& histogram = data_.latency[i];
+    if (histogram.count() == 0) continue;
+    sample.latencies.push_back({kStageNames[i], histogram.count(), histogram.quantile_us(0.5),
+                                histogram.quantile_us(0.99), histogram.quantile_us(0.999), histogram.max_us()});
   }
   publisher_.publish_status(sample);
 }

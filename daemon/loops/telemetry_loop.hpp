@@ -1,6 +1,6 @@
 #pragma once
 // What the real-time loops leave behind becomes statistics, log lines and DDS topics. Normal scheduling.
-#include <map>
+#include <array>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -12,6 +12,11 @@
 
 namespace embody {
 
+/// Stages whose duration is measured, along the arm's path and then the fingers' (docs/demo.md).
+enum class Stage : std::uint8_t { kDecode, kHandPose, kPhaseWait, kArm, kWrite, kTotal, kFingerWait, kFingerSolve };
+inline constexpr std::array<const char*, 8> kStageNames{"decode", "hand_pose", "phase_wait",  "arm",
+                                                        "write",  "total",     "finger_wait", "fingers"};
+
 /// Statistics at one moment; a copy for whoever asks.
 struct TelemetrySnapshot {
   safety::ModeState mode;
@@ -19,8 +24,8 @@ struct TelemetrySnapshot {
   double arm_hz{0.0};   ///< commands to the arm per second
   double hand_hz{0.0};  ///< motion commands to the hand per second
   double fingers_hz{0.0};
-  std::map<std::string, Histogram> latency;        ///< by stage
-  std::array<double, kFingers> residual_mean_m{};  ///< mean over all frames since start
+  std::array<Histogram, kStageNames.size()> latency;  ///< by Stage
+  std::array<double, kFingers> residual_mean_m{};     ///< mean over all frames since start
   std::array<double, kFingers> residual_now_m{};
   double arm_error_m{0.0};  ///< measured flange to ungated target, now
   double arm_error_rad{0.0};
@@ -43,6 +48,7 @@ class TelemetryLoop {
  private:
   void take();
   void take_timings();
+  [[nodiscard]] Histogram& latency(Stage stage) { return data_.latency[static_cast<std::size_t>(stage)]; }
   void measure_errors();
   void measure_rates(TimePoint now);
   void log_mode();

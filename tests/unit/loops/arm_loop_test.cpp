@@ -16,15 +16,29 @@ using test::eventually;
 using test::FakeArm;
 using transport::now;
 
+/// Times so long that a busy machine changes nothing.
+ArmLoopConfig patient() {
+  ArmLoopConfig config;
+  config.command_lifetime = std::chrono::seconds(10);
+  config.arming_grace = std::chrono::seconds(10);
+  return config;
+}
+safety::ModeConfig patient_modes() {
+  safety::ModeConfig config;
+  config.hold_after = std::chrono::seconds(10);
+  config.stop_after = std::chrono::seconds(20);
+  return config;
+}
+
 /// An arm loop with a fake arm, a tracker that is there, and a hand that has answered. Scripts run on the loop's
 /// thread, once for each read() of the arm.
 class ArmBench {
  public:
-  explicit ArmBench(const ArmLoopConfig& config = {}, teleop::Clutch clutch = teleop::Clutch::kAbsolute)
+  explicit ArmBench(const ArmLoopConfig& config = patient(), const safety::ModeConfig& modes = patient_modes())
       : tracker_baton(tracker),
         arm_baton(arm),
-        cell(test::cell_config(clutch)),
-        loop(arm_baton, tracker_baton, cell, safety::ModeConfig{}, config, edges) {
+        cell(test::cell_config(teleop::Clutch::kAbsolute)),
+        loop(arm_baton, tracker_baton, cell, modes, config, edges) {
     tracker.fd = arm.fd = ready.get();
     tracker_baton.pass_to_loop(*tracker.connect());
     arm.state.condition = ArmCondition::kReady;
@@ -38,6 +52,7 @@ class ArmBench {
     HandPose pose;
     pose.valid = true;
     pose.streak = 100;
+    pose.jumps = jumps;
     pose.sequence = ++poses;
     pose.t_capture = pose.t_arrival = now();
     pose.X_WM = cell.X_BW.inverse() * X_BE_goal * cell.X_EP * cell.X_PM;
@@ -57,7 +72,7 @@ class ArmBench {
   /// Connects and runs the loop to its end on a thread of its own; returns its heap uses.
   std::uint64_t run() {
     arm_baton.pass_to_loop(*arm.connect());
-    test::WatchedThread thread([this] { loop.run(); });
+    test::WatchedThread thread(edges.stop, [this] { loop.run(); });
     EXPECT_TRUE(thread.started());
     return thread.join();
   }
@@ -71,6 +86,7 @@ class ArmBench {
   teleop::ArmControllerConfig cell;
   Pose X_BE_goal{Pose::Identity()};
   std::uint64_t poses{0};
+  std::uint32_t jumps{0};
   std::uint32_t requests{0};
   ArmLoop loop;
 };
@@ -104,7 +120,7 @@ TEST(ArmLoop, AnswersEachPackageWithExactlyOneCommandInOrder) {
     ASSERT_EQ(answer.package, i + 1) << "answered late, twice or never";
     ASSERT_EQ(answer.command.sequence, i + 1);
     ASSERT_EQ(answer.command.action, ArmAction::kHold) << "nobody asked for motion";
-    ASSERT_EQ(answer.command.t_expires, answer.t_arrival + ArmLoopConfig{}.command_lifetime);
+    ASSERT_EQ(answer.command.t_expires, answer.t_arrival + patient().command_lifetime);
   }
   EXPECT_EQ(bench.edges.counters.robot_packages, kPackages);
   EXPECT_EQ(bench.edges.counters.arm_commands, kPackages);
@@ -162,7 +178,7 @@ TEST(ArmLoop, GivesTheRobotConsecutiveNumbersAlthoughSomeCommandsAreNotSent) {
 }
 
 TEST(ArmLoop, LetsCommandsExpire) {
-  ArmLoopConfig config;
+  ArmLoopConfig config = patient();
   config.command_lifetime = -milliseconds(1);
   ArmBench bench(config);
   bench.arm.script = [&] {
@@ -228,7 +244,7 @@ TEST(ArmLoop, ReachesTheHandAndStampsCommandsWithTheirMeasurement) {
 }
 
 TEST(ArmLoop, WaitsForTheRobotsProgramToFollowAndHoldsWhenItNeverDoes) {
-  ArmLoopConfig config;
+  ArmLoopConfig config = patient();
   config.arming_grace = milliseconds(20);
   ArmBench bench(config);
   bench.arm.obedient = false;
@@ -245,7 +261,7 @@ TEST(ArmLoop, WaitsForTheRobotsProgramToFollowAndHoldsWhenItNeverDoes) {
 }
 
 TEST(ArmLoop, HoldsWhenTheHandPoseStaysAway) {
-  ArmBench bench;
+  ArmBench bench(patient(), safety::ModeConfig{});
   bench.X_BE_goal.translation().z() -= 0.10;
   bool coasted = false;
   int n = 0;
@@ -261,6 +277,27 @@ TEST(ArmLoop, HoldsWhenTheHandPoseStaysAway) {
   EXPECT_TRUE(coasted);
   EXPECT_EQ(bench.mode().holds, 1U);
   EXPECT_EQ(bench.arm.answers.back().command.action, ArmAction::kHold);
+}
+
+TEST(ArmLoop, EndsMotionWhenTheHandPoseJumpsAndEngagesAgainOnRequestOnly) {
+  ArmBench bench;
+  bench.jumps = 7;  // those before engaging do not count
+  std::vector<safety::ModeState> seen(2000);
+  bench.arm.script = engaged_script(bench, [&](int n) {
+    if (n == 100) ++bench.jumps;
+    if (n == 1000) bench.ask(RequestKind::kEngage);
+    if (n == 1200) bench.shut_down();
+    seen[static_cast<std::size_t>(std::min(n, 1999))] = bench.mode();
+    return IoStatus::kDone;
+  });
+  EXPECT_EQ(bench.run(), 0U) << "heap uses";
+  EXPECT_EQ(seen[100].mode, Mode::kEngaged);
+  // The pose with the jump was published just before package 100 was read: at the latest two ticks later it counts.
+  EXPECT_EQ(seen[103].mode, Mode::kHolding);
+  EXPECT_EQ(seen[103].cause, Cause::kHandPoseJumped);
+  EXPECT_EQ(seen[1000].mode, Mode::kHolding);
+  EXPECT_EQ(seen[1100].mode, Mode::kEngaged);
+  EXPECT_EQ(seen[1100].holds, 1U);
 }
 
 TEST(ArmLoop, DisarmsInTheTickOfAProtectiveStop) {
@@ -301,7 +338,7 @@ TEST(ArmLoop, GivesBackAnArmThatFallsSilent) {
     return IoStatus::kEmpty;
   });
   bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); }));
   bench.edges.stop = true;
   thread.join();
@@ -312,7 +349,7 @@ TEST(ArmLoop, GivesBackAnArmThatFallsSilent) {
 TEST(ArmLoop, DISABLED_GivesBackAnArmThatNeverSendsAPackage) {
   ArmBench bench;
   bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); })) << "links would never connect again";
   bench.edges.stop = true;
   thread.join();
@@ -325,7 +362,7 @@ TEST(ArmLoop, GivesTheArmBackWhenLinksRevokeIt) {
     return IoStatus::kDone;
   });
   bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); }));
   bench.edges.stop = true;
   thread.join();
@@ -344,7 +381,7 @@ TEST(ArmLoop, DISABLED_CommandsNothingInANewSessionBeforeTheOperatorEngages) {
     return IoStatus::kDone;
   };
   bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); }));
   bench.arm.state.q_rad += Vector6::Constant(0.05);  // where the robot braked by itself
   const Vector6 q_stopped = bench.arm.state.q_rad;
@@ -360,7 +397,7 @@ TEST(ArmLoop, DISABLED_CommandsNothingInANewSessionBeforeTheOperatorEngages) {
 
 TEST(ArmLoop, StillDecidesRequestsAndTicksTheModeWithoutAnArm) {
   ArmBench bench;
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   bench.ask(RequestKind::kEngage);
   EXPECT_TRUE(eventually([&] { return bench.mode().request_id == 1; }));
   EXPECT_FALSE(bench.mode().request_accepted);

@@ -3,6 +3,7 @@
 // thread, so that tests need neither sleeps nor network. Nothing here allocates once a loop runs.
 #include <sys/eventfd.h>
 
+#include <atomic>
 #include <functional>
 #include <thread>
 #include <vector>
@@ -118,16 +119,19 @@ template <class Condition>
   return true;
 }
 
-/// A loop on its own thread whose heap use is counted. The destructor joins: the test must have ended the loop.
+/// A loop on its own thread whose heap use is counted. The destructor ends it through `stop`.
 class WatchedThread {
  public:
-  explicit WatchedThread(std::function<void()> body) : before_(heap_guard::count()) {
+  WatchedThread(std::atomic<bool>& stop, std::function<void()> body) : stop_(stop), before_(heap_guard::count()) {
     ThreadOptions options;
     options.name = "loop";
     options.watch_heap = true;
     started_ = thread_.start(options, std::move(body)).ok();
   }
-  /// Joins and returns the heap uses of the loop; 0 where they cannot be counted.
+  WatchedThread(const WatchedThread&) = delete;
+  WatchedThread& operator=(const WatchedThread&) = delete;
+  ~WatchedThread() { stop_ = true; }  // thread_ joins
+  /// Waits for the end of the loop and returns its heap uses; 0 where they cannot be counted.
   std::uint64_t join() {
     thread_.join();
     return heap_guard::active() ? heap_guard::count() - before_ : 0;
@@ -135,6 +139,7 @@ class WatchedThread {
   [[nodiscard]] bool started() const noexcept { return started_; }
 
  private:
+  std::atomic<bool>& stop_;
   std::uint64_t before_;
   bool started_{false};
   Thread thread_;

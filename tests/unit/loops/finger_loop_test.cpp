@@ -50,7 +50,7 @@ class FingerBench {
 
 TEST(FingerLoop, TurnsEachFrameIntoAFingerTarget) {
   FingerBench bench;
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   for (std::size_t k = 0; k < 20; ++k) {
     bench.publish(k);
     ASSERT_TRUE(eventually([&] { return bench.used() == k + 1; })) << "frame " << k;
@@ -71,7 +71,7 @@ TEST(FingerLoop, TurnsEachFrameIntoAFingerTarget) {
 
 TEST(FingerLoop, TakesTheNewestFrameAndCountsTheOnesItPassesOver) {
   FingerBench bench;
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   bench.publish(0);
   EXPECT_TRUE(eventually([&] { return bench.used() == 1; }));  // skips count from the first frame on
   for (std::size_t k = 1; k < 500; ++k) bench.publish(k);
@@ -85,7 +85,7 @@ TEST(FingerLoop, TakesTheNewestFrameAndCountsTheOnesItPassesOver) {
 TEST(FingerLoop, ComputesForHalfOfTheTimeAtMost) {
   FingerBench bench({milliseconds(20), true});
   const TimePoint start = now();
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   for (std::size_t k = 0; now() - start < milliseconds(800); ++k) {
     bench.publish(k % bench.motion.frame_count());
     std::this_thread::yield();
@@ -101,7 +101,7 @@ TEST(FingerLoop, ComputesForHalfOfTheTimeAtMost) {
 
 TEST(FingerLoop, MarksTargetsOfAHandThatIsNotSeen) {
   FingerBench bench;
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   TrackedFrame nothing;
   nothing.sequence = 1;
   bench.edges.frame_to_fingers.publish(nothing);

@@ -61,7 +61,7 @@ class HandBench {
   }
   std::uint64_t run() {
     baton.pass_to_loop(*hand.connect());
-    test::WatchedThread thread([this] { loop.run(); });
+    test::WatchedThread thread(edges.stop, [this] { loop.run(); });
     return thread.join();
   }
 
@@ -184,7 +184,7 @@ TEST(HandLoop, IsReadyOnlyWhenTheHandHasAnswered) {
 
 TEST(HandLoop, BeatsWithoutAHand) {
   HandBench bench;
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(test::eventually([&] { return bench.edges.heartbeats.hand > 5; }));
   bench.edges.stop = true;
   EXPECT_EQ(thread.join(), 0U) << "heap uses";

@@ -29,7 +29,7 @@ class TrackerBench {
   }
   std::uint64_t run() {
     baton.pass_to_loop(*tracker.connect());
-    test::WatchedThread thread([this] { loop.run(); });
+    test::WatchedThread thread(edges.stop, [this] { loop.run(); });
     return thread.join();
   }
 
@@ -118,7 +118,7 @@ TEST(TrackerLoop, GivesTheTrackerBackWhenLinksRevokeItAndTakesItAgain) {
     return IoStatus::kEmpty;
   };
   bench.baton.pass_to_loop(*bench.tracker.connect());
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(test::eventually([&] { return reads > 0; }));
   bench.baton.revoke();
   EXPECT_TRUE(test::eventually([&] { return bench.baton.with_links(); }));
@@ -131,7 +131,7 @@ TEST(TrackerLoop, GivesTheTrackerBackWhenLinksRevokeItAndTakesItAgain) {
 
 TEST(TrackerLoop, BeatsWithoutATracker) {
   TrackerBench bench;
-  test::WatchedThread thread([&] { bench.loop.run(); });
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
   EXPECT_TRUE(test::eventually([&] { return bench.edges.heartbeats.tracker > 3; }));
   bench.edges.stop = true;
   thread.join();

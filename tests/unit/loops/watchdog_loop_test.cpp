@@ -42,7 +42,7 @@ Outcome watch(Hung hung, Duration duration) {
     return ::recv(robot.get(), &byte, 1, 0) == 0;
   };
   const TimePoint start = now();
-  test::WatchedThread thread([&] { loop.run(); });
+  test::WatchedThread thread(edges.stop, [&] { loop.run(); });
   TimePoint last = start;
   while (now() - start < duration) {
     if (hung != Hung::kArm) ++edges.heartbeats.arm;

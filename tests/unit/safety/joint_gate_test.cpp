@@ -161,6 +161,19 @@ TEST(JointGate, ReachesAConstantTargetFromRestWithoutOvershoot) {
   }
 }
 
+TEST(JointGate, IsAtRestWhereItIsResetWhateverItDidBefore) {
+  JointGate gate(demo_limits());
+  gate.reset(Vector6::Zero());
+  for (int i = 0; i < 200; ++i) gate.follow(Vector6::Constant(2.0), Vector6::Zero(), 0.002);
+  ASSERT_FALSE(gate.at_rest());
+  const Vector6 here = Vector6::Constant(0.7);
+  gate.reset(here);
+  EXPECT_TRUE(gate.at_rest());
+  EXPECT_EQ(gate.q_rad(), here);
+  gate.brake(0.002);
+  EXPECT_EQ(gate.q_rad(), here);
+}
+
 TEST(JointGate, BrakesToExactlyZeroOnTheShortestWayFromAnySpeed) {
   test::RandomValues random(41);
   for (int run = 0; run < 200; ++run) {

@@ -28,6 +28,7 @@ class RandomWorld {
     toggle(tracker_speaks_, 0.003, 0.03);
     toggle(health.arm_at_rest, 0.02, 0.05);
     health.watchdog_bit = chance(0.0001);
+    health.hand_jumped = chance(0.0005);
     if (!arm_ready_ && health.arm == ArmCondition::kReady) {
       health.arm = static_cast<ArmCondition>(static_cast<int>(random_(0.0, 6.999)));
     }

@@ -285,6 +285,33 @@ TEST(ArmController, GoesOnFromWhereBrakingLeftTheSetPoint) {
   }
 }
 
+TEST(ArmController, IsNoFurtherOnItsWayThanItsSpeedAllows) {
+  ArmControllerConfig config = cell_config(Clutch::kRelative);
+  config.joints.speed_rad_s *= 2.0;  // so that the flange limits decide
+  config.joints.acceleration_rad_s2 *= 10.0;
+  const Pose X_BE = robot::forward_kinematics(usual_posture());
+  for (const bool turns : {false, true}) {
+    const auto leap = [&](double t_s) {
+      Pose X = X_BE;
+      if (t_s >= 0.0 && !turns) X.translation() += Eigen::Vector3d(0.2, -0.3, -0.2);
+      if (t_s >= 0.0 && turns) X.linear() = X.linear() * math::exp_so3({0.5, 0.6, -0.4});
+      return X;
+    };
+    ArmRig rig(config, leap);
+    ASSERT_TRUE(rig.measure(usual_posture()));
+    rig.engage();
+    double arrived_s = 0.0;
+    for (int i = 0; i < 2000; ++i) {
+      const Pose X = robot::forward_kinematics(rig.follow().q_rad);
+      const double way = turns ? angle(X, X_BE) : distance(X, X_BE);
+      const double allowed = (turns ? config.speed_rad_s : config.speed_m_s) * (rig.now_s - 0.02);
+      ASSERT_LE(way, std::max(0.0, allowed) + 0.005) << "at " << rig.now_s << " s";
+      if ((turns ? angle(X, leap(1.0)) : distance(X, leap(1.0))) > 0.002) arrived_s = rig.now_s;
+    }
+    EXPECT_LT(arrived_s, turns ? 1.1 : 1.9) << "0.88 rad at 1 rad/s, 0.41 m at 0.25 m/s";
+  }
+}
+
 // What no command exceeds, says the configuration: the flange itself, not only its reference.
 double largest_flange_speed(const ArmControllerConfig& config, const ArmRig::Path& path) {
   ArmRig rig(config, path);

@@ -100,6 +100,18 @@ TEST(PoseMonitor, AcceptsALastingChangeOnceFivePosesAgreeOnIt) {
   }
 }
 
+TEST(PoseMonitor, CountsAJumpBeforeItsFirstPoseIsAccepted) {
+  Stream stream;
+  for (int k = 0; k < 10; ++k) ASSERT_EQ(stream.step(kHere).jumps, 0U);
+  ASSERT_EQ(stream.step(kThere).jumps, 0U) << "one outlier is no jump";
+  for (int k = 0; k < 10; ++k) ASSERT_EQ(stream.step(kHere).jumps, 0U);
+  for (int k = 0; k < 10; ++k) {
+    const HandPose pose = stream.step(kThere);
+    ASSERT_TRUE(!pose.valid || pose.jumps == 1U) << "whoever follows this pose must know";
+  }
+  EXPECT_EQ(stream.step(kThere).jumps, 1U);
+}
+
 TEST(PoseMonitor, NeverAcceptsJumpsThatDoNotAgree) {
   Stream stream;
   for (int k = 0; k < 10; ++k) stream.step(kHere);
