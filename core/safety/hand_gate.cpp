@@ -17,7 +17,12 @@ HandCommand HandGate::step(TimePoint now, double dt_s, const ModeState& mode, co
     command.action = mode_current && mode.mode == Mode::kStopped ? HandAction::kStop : HandAction::kHold;
     return command;
   }
-  if (!following_) q_rad_ = measured.q_rad;
+  if (!following_) {
+    for (std::size_t i = 0; i < measured.joint_count; ++i) {
+      if (!std::isfinite(measured.q_rad[i])) return command;  // nowhere to start from: hold
+    }
+    q_rad_ = measured.q_rad;
+  }
   following_ = true;
   const double step = config_.speed_rad_s * dt_s;
   for (std::size_t i = 0; i < measured.joint_count; ++i) {

@@ -11,9 +11,10 @@ struct JointLimits {
   Vector6 upper_rad{Vector6::Constant(6.28318530717958648)};
 };
 
-/// A set-point that follows a target with feed-forward. It can always brake before the target: the wanted closing speed
-/// is at most sqrt(a |d|), half of the available deceleration a, the rest is left for the feed-forward; near the target
-/// it is kGain |d|, which does not chatter.
+/// A set-point that follows a target with feed-forward. The wanted closing speed is at most sqrt(a |d|), half of the
+/// available deceleration a (the rest is left for the feed-forward), kGain |d|, which does not chatter, and the
+/// greatest speed from which the set-point still stops at the target. The same bound holds against both joint limits,
+/// with any target, feed-forward and length of the ticks: started inside its range, a joint never leaves it.
 class JointGate {
  public:
   explicit JointGate(const JointLimits& limits) noexcept : limits_(limits) {}
@@ -23,6 +24,10 @@ class JointGate {
   /// One tick of `dt` towards `q_d` moving with `qd_d`. Non-finite targets brake. Targets beyond the joint limits are
   /// clamped to them. Cost: six square roots.
   void follow(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s) noexcept;
+  /// The two halves of follow(), for a caller that bounds the wanted speeds further: what the joints should do ...
+  [[nodiscard]] Vector6 wanted_speed(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s) const noexcept;
+  /// ... and one tick of doing it within speed, acceleration and range.
+  void move(const Vector6& wanted_rad_s, double dt_s) noexcept;
   /// One tick of braking with the full deceleration.
   void brake(double dt_s) noexcept;
 
@@ -33,8 +38,6 @@ class JointGate {
 
  private:
   static constexpr double kGain = 30.0;  // 1/s
-
-  void move_with(int joint, double wanted_rad_s, double dt_s) noexcept;
 
   JointLimits limits_;
   Vector6 q_rad_{Vector6::Zero()};

@@ -26,6 +26,11 @@ Cause arm_obstacle(const Health& health) noexcept {
   return Cause::kArmFault;
 }
 
+/// Conditions that stop in any mode, and that a reset cannot leave while they last.
+bool is_latching(Cause cause) noexcept {
+  return cause == Cause::kProtectiveStop || cause == Cause::kEmergencyStop || cause == Cause::kArmFault;
+}
+
 bool is_latched(Mode mode) noexcept {
   return mode == Mode::kHolding || mode == Mode::kStopped;
 }
@@ -39,7 +44,7 @@ const char* to_string(Mode mode) noexcept {
 }
 
 const char* to_string(Cause cause) noexcept {
-  static constexpr std::array<const char*, 16> kNames{
+  static constexpr std::array<const char*, 17> kNames{
       "",
       "asked by the operator",
       "no fresh hand pose",
@@ -56,6 +61,7 @@ const char* to_string(Cause cause) noexcept {
       "sudden jump of the hand pose",
       "watchdog found a hung loop",
       "shutting down",
+      "decided too late",
   };
   return kNames[static_cast<std::size_t>(cause)];
 }
@@ -64,12 +70,14 @@ const ModeState& ModeMachine::step(TimePoint now, const Request* request, const 
   if (state_.t == TimePoint{}) state_.t_since = now;
   state_.t = now;
   if (health.target_reachable || !is_moving_mode(state_.mode)) t_reachable_ = now;
+  const std::uint32_t epoch = state_.epoch;
   check_faults(now, health);
-  check_input(now, health);
-  check_readiness(now, health);
+  if (state_.epoch == epoch) check_input(now, health);
+  if (state_.epoch == epoch) check_readiness(now, health);
   if (request != nullptr) {
     state_.request_id = request->id;
-    state_.request_accepted = decide(now, request->kind, health);
+    state_.refusal = Cause::kNone;
+    state_.request_accepted = decide(now, *request, health);
   }
   return state_;
 }
@@ -93,9 +101,8 @@ void ModeMachine::check_faults(TimePoint now, const Health& health) noexcept {
   if (state_.mode == Mode::kStopped) return;
   const bool active = is_moving_mode(state_.mode) || state_.mode == Mode::kHolding;
   const Cause arm = arm_obstacle(health);
-  const bool latching = arm == Cause::kProtectiveStop || arm == Cause::kEmergencyStop || arm == Cause::kArmFault;
   if (health.watchdog_bit) return enter(Mode::kStopped, Cause::kWatchdog, now);
-  if (arm != Cause::kNone && (active || latching)) return enter(Mode::kStopped, arm, now);
+  if (arm != Cause::kNone && (active || is_latching(arm))) return enter(Mode::kStopped, arm, now);
   if (active && !health.hand_connected) return enter(Mode::kStopped, Cause::kHandLost, now);
   if (!is_moving_mode(state_.mode)) return;
   if (!health.arm_following) return enter(Mode::kHolding, Cause::kArmNotFollowing, now);
@@ -150,35 +157,45 @@ Cause ModeMachine::obstacle(TimePoint now, const Health& health) const noexcept 
   return Cause::kNone;
 }
 
-bool ModeMachine::decide(TimePoint now, RequestKind kind, const Health& health) noexcept {
-  switch (kind) {
+bool ModeMachine::decide(TimePoint now, const Request& request, const Health& health) noexcept {
+  const bool expired = request.t_expires != TimePoint{} && now > request.t_expires;
+  switch (request.kind) {
     case RequestKind::kEngage:
+      if (expired) return refuse(Cause::kRequestExpired);
       if (state_.mode == Mode::kEngaged) return true;
-      if (state_.mode != Mode::kAligned && state_.mode != Mode::kHolding) return false;
-      if (obstacle(now, health) != Cause::kNone) return false;
+      if (state_.mode != Mode::kAligned && state_.mode != Mode::kHolding) return refuse(state_.cause);
+      if (const Cause cause = obstacle(now, health); cause != Cause::kNone) return refuse(cause);
       enter(Mode::kEngaged, Cause::kNone, now);
       return true;
     case RequestKind::kDisengage:
-      if (state_.mode == Mode::kStopped) return false;
+      if (state_.mode == Mode::kStopped) return refuse(state_.cause);
       if (is_moving_mode(state_.mode) || state_.mode == Mode::kHolding) enter(Mode::kIdle, Cause::kOperator, now);
       return true;
     case RequestKind::kStop:
-      enter(Mode::kStopped, Cause::kOperator, now);
+      if (!shutting_down()) enter(Mode::kStopped, Cause::kOperator, now);
       return true;
     case RequestKind::kShutdown:
       enter(Mode::kStopped, Cause::kShutdown, now);
       return true;
     case RequestKind::kReset:
+      if (expired) return refuse(Cause::kRequestExpired);
       if (state_.mode != Mode::kStopped) return true;
-      if (state_.cause == Cause::kShutdown || health.watchdog_bit) return false;
-      if (health.arm_connected && arm_obstacle(health) != Cause::kNone && health.arm != ArmCondition::kNotRunning &&
-          health.arm != ArmCondition::kUnknown) {
-        return false;
-      }
+      if (shutting_down()) return refuse(Cause::kShutdown);
+      if (health.watchdog_bit) return refuse(Cause::kWatchdog);
+      if (const Cause cause = arm_obstacle(health); health.arm_connected && is_latching(cause)) return refuse(cause);
       enter(Mode::kIdle, Cause::kOperator, now);
       return true;
   }
   return false;
+}
+
+bool ModeMachine::refuse(Cause cause) noexcept {
+  state_.refusal = cause;
+  return false;
+}
+
+bool ModeMachine::shutting_down() const noexcept {
+  return state_.mode == Mode::kStopped && state_.cause == Cause::kShutdown;
 }
 
 }  // namespace embody::safety

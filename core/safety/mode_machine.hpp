@@ -34,6 +34,7 @@ enum class Cause : std::uint8_t {
   kHandPoseJumped,
   kWatchdog,
   kShutdown,
+  kRequestExpired,
 };
 
 [[nodiscard]] const char* to_string(Mode mode) noexcept;
@@ -44,7 +45,8 @@ enum class RequestKind : std::uint8_t { kEngage, kDisengage, kStop, kReset, kShu
 
 struct Request {
   RequestKind kind{RequestKind::kStop};
-  std::uint32_t id{0};  ///< chosen by the sender, returned in ModeState
+  std::uint32_t id{0};    ///< chosen by the sender, returned in ModeState
+  TimePoint t_expires{};  ///< engage and reset are refused after this; the default never expires
 };
 
 /// What the loops know at this tick.
@@ -79,6 +81,7 @@ struct ModeState {
   std::uint32_t holds{0};       ///< times that motion ended without the operator asking
   std::uint32_t request_id{0};  ///< newest request that was decided
   bool request_accepted{false};
+  Cause refusal{Cause::kNone};  ///< why it was not
 };
 
 [[nodiscard]] constexpr bool is_moving_mode(Mode mode) noexcept {
@@ -99,7 +102,9 @@ class ModeMachine {
   void check_faults(TimePoint now, const Health& health) noexcept;
   void check_input(TimePoint now, const Health& health) noexcept;
   void check_readiness(TimePoint now, const Health& health) noexcept;
-  [[nodiscard]] bool decide(TimePoint now, RequestKind kind, const Health& health) noexcept;
+  [[nodiscard]] bool decide(TimePoint now, const Request& request, const Health& health) noexcept;
+  bool refuse(Cause cause) noexcept;
+  [[nodiscard]] bool shutting_down() const noexcept;
   [[nodiscard]] bool fresh(TimePoint now, const Health& health) const noexcept;
   /// First reason why engaging is not possible now, kNone if it is.
   [[nodiscard]] Cause obstacle(TimePoint now, const Health& health) const noexcept;

@@ -38,7 +38,7 @@ bool ArmController::track_measured(TimePoint now, const Vector6& q_rad) noexcept
   q_d_rad_ = q_rad;
   X_BEr_ = robot::forward_kinematics(q_rad);
   const std::optional<Pose> X_BEt = target(now);
-  if (!X_BEt) return false;
+  if (!X_BEt || !math::is_valid(*X_BEt)) return false;
   X_BEd_ = config_.clutch == Clutch::kAbsolute ? *X_BEt : X_BEr_;
   return inside(config_.workspace_B, X_BEd_.translation()) && robot::solve_nearest(X_BEd_, q_rad, range_).ok();
 }
@@ -68,11 +68,19 @@ ArmReference ArmController::follow(TimePoint now, double dt_s) noexcept {
     q_d_rad_ = *q;
     X_BEr_ = X_BEn;
   }
-  gate_.follow(q_d_rad_, qd_d, dt_s);
+  const Vector6 wanted = gate_.wanted_speed(q_d_rad_, qd_d, dt_s);
+  gate_.move(wanted * flange_scale(wanted), dt_s);
   reference.q_rad = gate_.q_rad();
   reference.qd_rad_s = gate_.qd_rad_s();
-  reference.reachable = solved;
+  reference.reachable = solved && inside(config_.workspace_B, X_BEd_.translation());
   return reference;
+}
+
+/// Part of the joint speeds `qd` at which the flange keeps its speed limits: catching up must not exceed them either.
+double ArmController::flange_scale(const Vector6& qd_rad_s) const noexcept {
+  const Vector6 twist = robot::jacobian(gate_.q_rad()) * qd_rad_s;
+  return std::min({1.0, config_.speed_m_s / std::max(twist.head<3>().norm(), 1e-12),
+                   config_.speed_rad_s / std::max(twist.tail<3>().norm(), 1e-12)});
 }
 
 ArmReference ArmController::brake(double dt_s) noexcept {

@@ -36,7 +36,7 @@ struct ArmReference {
   Pose X_BEd{Pose::Identity()};  ///< ungated target: clutch applied, no limits
   Vector6 q_rad{Vector6::Zero()};
   Vector6 qd_rad_s{Vector6::Zero()};
-  bool reachable{false};  ///< the reference could follow: within reach and without a branch flip
+  bool reachable{false};  ///< target inside the workspace, within reach, and without a branch flip
 };
 
 class ArmController {
@@ -58,12 +58,16 @@ class ArmController {
   /// One tick of braking within the joint limits.
   ArmReference brake(double dt_s) noexcept;
 
+  /// The set-point has no motion any more: the robot's connection is gone.
+  void halt() noexcept { gate_.reset(gate_.q_rad()); }
+
   [[nodiscard]] bool at_rest() const noexcept { return gate_.at_rest(); }
 
  private:
   /// Flange target without clutch at the robot's present, `resample_delay` in the past; nothing without poses.
   [[nodiscard]] std::optional<Pose> target(TimePoint now) const noexcept;
   void shrink_offset(double dt_s) noexcept;
+  [[nodiscard]] double flange_scale(const Vector6& qd_rad_s) const noexcept;
   [[nodiscard]] Pose limit_step(const Pose& X_BEd, double dt_s) const noexcept;
 
   ArmControllerConfig config_;

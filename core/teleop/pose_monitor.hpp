@@ -10,7 +10,8 @@ namespace embody::teleop {
 class PoseMonitor {
  public:
   void step(HandPose& pose) noexcept {
-    if (!pose.valid) {
+    if (!pose.valid || !math::is_valid(pose.X_WM)) {
+      pose.valid = false;
       streak_ = 0;
     } else if (!started_ || plausible(pose, last_)) {
       const bool gap = !started_ || pose.t_capture - last_.t_capture > kGap;
@@ -23,8 +24,9 @@ class PoseMonitor {
       suspect_ = pose;
       streak_ = 0;
       pose.valid = false;
-      if (suspects_ >= kAcceptAfter) {
-        started_ = false;
+      if (suspects_ >= kAcceptAfter) {  // the next pose that agrees is good again
+        last_ = pose;
+        suspects_ = 0;
         ++jumps_;
       }
     }

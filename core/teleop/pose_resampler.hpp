@@ -23,9 +23,9 @@ class PoseResampler {
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
 
   static constexpr Duration kMaxGap = std::chrono::milliseconds(200);
+  static constexpr std::size_t kCapacity = 256;  ///< the longest delay (200 ms) at 1000 frames per second
 
  private:
-  static constexpr std::size_t kCapacity = 16;
   struct Knot {
     TimePoint t{};
     math::Pose X{math::Pose::Identity()};

@@ -97,7 +97,8 @@ struct ArmConfig {
     v.field("driver", driver, "Which driver moves the arm.");
     v.field("host", host, "Name or address of the arm's controller.");
     v.field("port", port, Range{1, 65535}, "TCP port of the controller's real-time data exchange (RTDE).");
-    v.field("frequency_hz", frequency_hz, Range{1, 500}, "Packages per second: 500 for e-Series, 125 for CB3.");
+    v.field("frequency_hz", frequency_hz, Range{50, 500},
+            "Packages per second: 500 for e-Series, 125 for CB3. The controller sends a whole part of its own rate.");
     v.choice("clutch", clutch, kClutchNames,
              "absolute: the robot goes where the hand is; relative: it repeats the motion since engaging.");
     v.field("blend_speed_m_s", blend_speed_m_s, Range{0.001, 3},

@@ -10,16 +10,14 @@ using control::Request;
 using control::Response;
 
 /// One sentence: why not, and what would help.
-std::string explain(safety::RequestKind kind, const safety::ModeState& mode) {
-  const std::string name = safety::to_string(mode.mode);
-  const std::string cause = safety::to_string(mode.cause);
-  const std::string now = "mode is " + name + (cause.empty() ? "" : " (" + cause + ")");
-  if (kind == safety::RequestKind::kEngage) {
-    if (mode.mode == safety::Mode::kStopped) return now + ": remove the cause, then reset, then engage";
-    return now + ": engaging needs mode aligned";
-  }
-  if (kind == safety::RequestKind::kReset) return now + ": the cause is still there";
-  return now;
+std::string explain(safety::RequestKind kind, const Decision& decision) {
+  if (!decision.decided) return "the arm loop did not decide in time; nothing was done";
+  const safety::ModeState& mode = decision.mode;
+  const std::string now =
+      std::string("mode is ") + safety::to_string(mode.mode) + ": " + safety::to_string(mode.refusal);
+  if (mode.refusal == safety::Cause::kWatchdog) return now + "; restart the daemon";
+  if (mode.mode != safety::Mode::kStopped || kind == safety::RequestKind::kReset) return now;
+  return now + "; remove the cause, then reset";
 }
 
 Response decide(Daemon& daemon, safety::RequestKind kind) {
@@ -27,7 +25,7 @@ Response decide(Daemon& daemon, safety::RequestKind kind) {
   if (decision.accepted) {
     return {true, std::string(R"({"mode":")") + safety::to_string(decision.mode.mode) + "\"}", "", ""};
   }
-  return control::refusal(control::code::kRefused, explain(kind, decision.mode));
+  return control::refusal(control::code::kRefused, explain(kind, decision));
 }
 
 }  // namespace

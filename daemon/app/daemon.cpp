@@ -177,12 +177,26 @@ Status Daemon::start() {
           watchdog_thread_.start(options("watchdog", p.watchdog, cpus.watchdog), [this] { watchdog_loop_.run(); });
       !s)
     return s;
-  if (Status s = telemetry_thread_.start({"telemetry", 0, {}, false}, [this] { telemetry_->run(); }); !s) return s;
-  return links_thread_.start({"links", 0, {}, false}, [this] { links_->run(); });
+  if (Status s =
+          telemetry_thread_.start({"telemetry", 0, {}, false}, guarded("telemetry", [this] { telemetry_->run(); }));
+      !s)
+    return s;
+  return links_thread_.start({"links", 0, {}, false}, guarded("links", [this] { links_->run(); }));
 }
 
-void Daemon::stop() {
-  if (!running_) return;
+std::function<void()> Daemon::guarded(const char* name, std::function<void()> body) {
+  return [this, name, body = std::move(body)] {
+    try {
+      body();
+    } catch (const std::exception& error) {
+      spdlog::critical("thread {} failed: {}", name, error.what());
+      edges_.failed.store(true, std::memory_order_relaxed);
+    }
+  };
+}
+
+bool Daemon::stop() {
+  if (!running_) return true;
   running_ = false;
   request(safety::RequestKind::kShutdown);
   edges_.stop.store(true, std::memory_order_relaxed);
@@ -193,17 +207,19 @@ void Daemon::stop() {
   watchdog_thread_.join();
   telemetry_thread_.join();
   links_thread_.join();
+  return edges_.arm_still.load(std::memory_order_relaxed);
 }
 
 Decision Daemon::request(safety::RequestKind kind) {
-  const safety::Request request{kind, ++request_id_};
-  edges_.requests.push(request);
   const TimePoint deadline = now() + std::chrono::milliseconds(200);
+  const safety::Request request{kind, ++request_id_, deadline};
+  edges_.requests.push(request);
   while (mode().request_id != request.id && now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  const safety::ModeState decided = mode();
-  return {decided.request_id == request.id && decided.request_accepted, decided};
+  const safety::ModeState state = mode();
+  const bool decided = state.request_id == request.id;
+  return {decided, decided && state.request_accepted, state};
 }
 
 safety::ModeState Daemon::mode() {

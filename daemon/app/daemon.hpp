@@ -27,6 +27,7 @@ struct RealtimeReport {
 
 /// Answer to an operator's request.
 struct Decision {
+  bool decided{false};  ///< in time; an engage or reset that was not is refused for good
   bool accepted{false};
   safety::ModeState mode;
 };
@@ -40,7 +41,8 @@ class Daemon {
   /// Locks memory and starts all threads. Errors: kPermission in mode "enforce" without real-time rights.
   Status start();
   /// Brakes, disarms, ends all threads in reverse order of the data path, the arm last. Takes at most about 8 s.
-  void stop();
+  /// False when the arm could not be brought to rest in time (the robot then stops by itself).
+  bool stop();
 
   /// Passes a request to the mode machine and waits for its decision (normally one robot cycle, at most 200 ms).
   Decision request(safety::RequestKind kind);
@@ -49,6 +51,8 @@ class Daemon {
   /// False when the watchdog found a hung loop, or has not come round itself since the last call. Call it at intervals
   /// of several watchdog periods (50 ms), from one thread.
   [[nodiscard]] bool healthy();
+  /// A thread for upkeep ended by an exception.
+  [[nodiscard]] bool failed() const noexcept { return edges_.failed.load(std::memory_order_relaxed); }
   [[nodiscard]] bool ever_connected() const { return links_->ever_connected(); }
   [[nodiscard]] std::vector<DeviceReport> devices() const { return links_->reports(); }
   /// Everything that `embodyctl status` shows, as one JSON object.
@@ -58,6 +62,8 @@ class Daemon {
   Daemon(const config::EmbodyConfig& config, Models models, std::unique_ptr<HandTracker> tracker,
          std::unique_ptr<ArmDriver> arm, std::unique_ptr<HandDriver> hand, DdsPublisher publisher);
   [[nodiscard]] std::vector<Link> make_links();
+  /// `body` whose exceptions are logged and end the daemon in order.
+  [[nodiscard]] std::function<void()> guarded(const char* name, std::function<void()> body);
   [[nodiscard]] ThreadOptions options(const char* name, int priority, const std::vector<int>& cpus) const;
 
   config::EmbodyConfig config_;

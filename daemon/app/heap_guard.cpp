@@ -1,6 +1,7 @@
 #include "daemon/app/heap_guard.hpp"
 
 #include <atomic>
+#include <bit>
 #include <cerrno>
 #include <cstddef>
 
@@ -72,6 +73,7 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
 }
 int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
   note();
+  if (alignment % sizeof(void*) != 0 || !std::has_single_bit(alignment)) return EINVAL;
   *block = __libc_memalign(alignment, size);
   return *block == nullptr ? ENOMEM : 0;
 }

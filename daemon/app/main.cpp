@@ -78,6 +78,7 @@ int serve(Daemon& daemon, control::ControlServer& server, const bool& shutdown, 
     }
     server.serve();
     if (shutdown) return kExitOk;
+    if (daemon.failed()) return kExitFailed;
     const TimePoint t = transport::now();
     if (t - t_health > std::chrono::milliseconds(300)) {
       if (daemon.healthy()) ::sd_notify(0, "WATCHDOG=1");
@@ -112,9 +113,12 @@ int run(const config::EmbodyConfig& config) {
   ::sd_notify(0, "READY=1");
   const int exit_code = serve(**daemon, **server, shutdown, signals, config.links);
   ::sd_notify(0, "STOPPING=1");
-  StopSignals::restore();  // a second Ctrl-C ends at once
-  (*daemon)->stop();
-  spdlog::info("embodyd stopped: arm and hand stand still");
+  signals.restore();  // a second Ctrl-C ends at once
+  if ((*daemon)->stop()) {
+    spdlog::info("embodyd stopped: the arm stands still");
+  } else {
+    spdlog::error("embodyd stopped without seeing the arm at rest: the robot brakes by itself");
+  }
   return exit_code;
 }
 

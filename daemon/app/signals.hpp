@@ -27,8 +27,11 @@ class StopSignals {
     signalfd_siginfo info{};
     return ::read(fd_.get(), &info, sizeof info) == sizeof info ? static_cast<int>(info.ssi_signo) : 0;
   }
-  /// From now on a further signal ends the process at once: the operator is impatient.
-  static void restore() noexcept {
+  /// From now on a further signal ends the process at once: the operator is impatient. Signals that are pending now
+  /// belong to the stop that is under way.
+  void restore() noexcept {
+    while (take() != 0) {
+    }
     sigset_t set;
     sigemptyset(&set);
     sigaddset(&set, SIGINT);

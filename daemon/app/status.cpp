@@ -27,6 +27,7 @@ json counters_json(const Edges& edges, const TelemetrySnapshot& telemetry, const
   return {{"frames_received", value(c.frames_received)},
           {"frames_used", value(c.frames_used)},
           {"poses_invalid", value(c.poses_invalid)},
+          {"poses_superseded", value(c.poses_superseded)},
           {"finger_frames", value(c.finger_frames)},
           {"finger_skipped", value(c.finger_skipped)},
           {"robot_packages", value(c.robot_packages)},
@@ -100,7 +101,7 @@ std::string Daemon::status_json() {
                       {"locked", realtime_.locked},
                       {"heap_counted", heap_guard::active()},
                       {"warning", realtime_.warning}}}};
-  return status.dump();
+  return status.dump(-1, ' ', false, json::error_handler_t::replace);  // devices may say anything
 }
 
 }  // namespace embody

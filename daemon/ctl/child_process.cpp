@@ -102,16 +102,19 @@ void ChildProcess::signal(int number) const noexcept {
 std::optional<int> ChildProcess::exit_code() noexcept {
   if (exit_code_) return exit_code_;
   int status = 0;
-  if (::waitpid(pid_, &status, WNOHANG) != pid_) return std::nullopt;
+  const pid_t ended = ::waitpid(pid_, &status, WNOHANG);
+  if (ended == 0 || (ended < 0 && errno == EINTR)) return std::nullopt;
+  if (ended < 0) return exit_code_ = 127;  // somebody else has taken its exit code
   exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return exit_code_;
 }
 
 int ChildProcess::wait(TimePoint deadline) noexcept {
+  bool killed = false;
   while (!exit_code()) {
-    if (transport::now() >= deadline) {
+    if (!killed && transport::now() >= deadline) {
       ::kill(pid_, SIGKILL);
-      deadline = transport::now() + std::chrono::seconds(1);
+      killed = true;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }

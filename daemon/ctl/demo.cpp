@@ -75,10 +75,11 @@ class Demo {
 
   int run() {
     if (!folder_.ok()) return fail("cannot create a private folder in $XDG_RUNTIME_DIR or /tmp", kExitFailed);
-    if (const int code = start_lab(); code != kExitOk) return code;
-    if (const int code = start_daemon(); code != kExitOk) return code;
-    const int code = operate();
+    int code = start_lab();
+    if (code == kExitOk) code = start_daemon();
+    if (code == kExitOk) code = operate();
     const int finished = finish();
+    if (interrupted_) return kExitInterrupted;
     return code != kExitOk ? code : finished;
   }
 
@@ -120,7 +121,7 @@ class Demo {
     if (!lab) return fail(std::string(lab.error().detail.view()), kExitFailed);
     lab_.emplace(std::move(*lab));
     const TimePoint deadline = now() + seconds(20);
-    while (now() < deadline && !lab_->exit_code() && signals_.take() == 0) {
+    while (now() < deadline && !lab_->exit_code() && !interrupted_) {
       wait(milliseconds(20));
       for (auto line = lab_->next_line(); line; line = lab_->next_line()) {
         const json event = json::parse(*line, nullptr, false);
@@ -134,7 +135,7 @@ class Demo {
         return kExitOk;
       }
     }
-    return child_failed("the simulated lab", *lab_, "sim.log");
+    return interrupted_ ? kExitInterrupted : child_failed("the simulated lab", *lab_, "sim.log");
   }
 
   int start_daemon() {
@@ -143,7 +144,7 @@ class Demo {
     if (!daemon) return fail(std::string(daemon.error().detail.view()), kExitFailed);
     daemon_.emplace(std::move(*daemon));
     const TimePoint deadline = now() + seconds(20);
-    while (now() < deadline && !daemon_->exit_code()) {
+    while (now() < deadline && !daemon_->exit_code() && !interrupted_) {
       auto client = control::ControlClient::connect(folder_.file("control.sock"));
       if (client) {
         client_.emplace(std::move(*client));
@@ -151,13 +152,18 @@ class Demo {
       }
       wait(milliseconds(20));
     }
-    return child_failed("embodyd", *daemon_, "embodyd.log");
+    return interrupted_ ? kExitInterrupted : child_failed("embodyd", *daemon_, "embodyd.log");
   }
 
-  /// Sleeps, but wakes for the lab's output.
-  void wait(milliseconds time) const {
-    pollfd entries[2] = {{lab_ ? lab_->output_fd() : -1, POLLIN, 0}, {signals_.fd(), POLLIN, 0}};
+  /// Sleeps, but wakes for the lab's output and for Ctrl-C.
+  void wait(milliseconds time) {
+    const bool lab_speaks = lab_ && !lab_->exit_code();
+    pollfd entries[2] = {{lab_speaks ? lab_->output_fd() : -1, POLLIN, 0}, {signals_.fd(), POLLIN, 0}};
     ::poll(entries, 2, static_cast<int>(time.count()));
+    while (signals_.take() != 0) {
+      if (interrupted_) signals_.restore();  // the third Ctrl-C ends everything at once
+      interrupted_ = true;
+    }
   }
 
   std::optional<control::Response> ask(control::Command command) {
@@ -176,7 +182,7 @@ class Demo {
   int operate() {
     while (true) {
       wait(milliseconds(20));
-      if (signals_.take() != 0) return kExitInterrupted;
+      if (interrupted_) return kExitInterrupted;
       if (daemon_->exit_code()) return child_failed("embodyd", *daemon_, "embodyd.log");
       if (lab_->exit_code()) return child_failed("the simulated lab", *lab_, "sim.log");
       if (take_events()) return kExitOk;
@@ -209,7 +215,7 @@ class Demo {
     last_status_ = status();
     const std::string mode = json::parse(last_status_, nullptr, false).value("/mode/name"_json_pointer, "");
     if (mode == "aligned" || mode == "holding") engage();
-    if (mode == "stopped") ask(control::Command::kReset);
+    if (mode == "stopped") reset();
     if (mode == "engaged" && status_engaged_.empty()) {
       status_engaged_ = last_status_;
       t_engaged_ = now();
@@ -234,11 +240,25 @@ class Demo {
     engaged_once_ = true;
   }
 
+  /// A stop is worth a line: the operator would look for its cause.
+  void reset() {
+    const auto response = ask(control::Command::kReset);
+    if (!response || !response->ok) return;
+    const json s = json::parse(last_status_, nullptr, false);
+    std::cout << "stopped: " << s.value("/mode/cause"_json_pointer, "?") << "; reset by the demo\n";
+    shown_lines_ = 0;
+    ++progress_.resets;
+  }
+
   /// Ends the daemon, then the lab; prints the summary.
   int finish() {
-    const std::string status_after = status();
-    daemon_->signal(SIGTERM);
-    const int daemon_code = daemon_->wait(now() + seconds(10));
+    const std::string status_after = client_ ? status() : "{}";
+    int daemon_code = kExitOk;
+    if (daemon_) {
+      daemon_->signal(SIGTERM);
+      daemon_code = daemon_->wait(now() + seconds(10));
+    }
+    if (!lab_) return kExitFailed;
     lab_->signal(SIGTERM);
     std::string report;
     const TimePoint deadline = now() + seconds(60);
@@ -253,7 +273,7 @@ class Demo {
     }
     if (t_finished_ == TimePoint{}) return kExitFailed;  // interrupted: nothing to judge
     const double played_s = t_engaged_ == TimePoint{} ? 0.0 : to_seconds(t_finished_ - t_engaged_);
-    const std::string summary = summary_json(report, status_engaged_, status_after, played_s, progress_.re_engagements);
+    const std::string summary = summary_json(report, status_engaged_, status_after, played_s, progress_);
     std::cout << "\nSummary\n" << summary_text(summary);
     if (!options_.json_file.empty()) {
       std::ofstream file(options_.json_file);
@@ -266,7 +286,7 @@ class Demo {
 
   DemoOptions options_;
   bool terminal_;
-  mutable StopSignals signals_;
+  StopSignals signals_;
   PrivateFolder folder_;
   std::optional<ChildProcess> lab_;  // outlives the daemon
   std::optional<ChildProcess> daemon_;
@@ -282,6 +302,7 @@ class Demo {
   TimePoint t_next_show_{};
   std::ptrdiff_t shown_lines_{0};
   bool engaged_once_{false};
+  bool interrupted_{false};
 };
 
 }  // namespace

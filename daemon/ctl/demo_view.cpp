@@ -91,7 +91,7 @@ std::string live_line(const std::string& status, const DemoProgress& progress) {
 }
 
 std::string summary_json(const std::string& report_text, const std::string& status_before,
-                         const std::string& status_after, double played_s, int re_engagements) {
+                         const std::string& status_after, double played_s, const DemoProgress& progress) {
   const json report = parse(report_text);
   const json before = parse(status_before);
   const json after = parse(status_after);
@@ -106,13 +106,14 @@ std::string summary_json(const std::string& report_text, const std::string& stat
         "arm_commands", "arm_commands_dropped", "hand_commands", "holds", "rt_heap_allocations"}) {
     summary[key] = counters.value(key, 0);
   }
-  for (const char* key :
-       {"frames_sent", "followed", "reason", "judged_s", "first_tracking_s", "engaged_fraction", "arm_lag_ms",
-        "arm_error_mm", "arm_error_rad", "hand_lag_ms", "hand_error_rad", "path_ratio", "largest_joint_speed_rad_s"}) {
+  for (const char* key : {"frames_sent", "frames_in_recording", "followed", "reason", "judged_s", "first_tracking_s",
+                          "engaged_fraction", "arm_lag_ms", "arm_error_mm", "arm_error_rad", "hand_lag_ms",
+                          "hand_error_rad", "path_ratio", "largest_joint_speed_rad_s"}) {
     summary[key] = report.value(key, json());
   }
   summary["sequence_gaps"] = report.value("ur", json::object()).value("sequence_gaps", 0);
-  summary["re_engagements"] = re_engagements;
+  summary["re_engagements"] = progress.re_engagements;
+  summary["resets"] = progress.resets;
   summary["arm_rate_hz"] = rate("arm_commands");
   summary["hand_rate_hz"] = rate("hand_commands");
   summary["played_s"] = played_s;
@@ -133,8 +134,10 @@ std::string summary_text(const std::string& summary) {
   add(out, "  arm               {:.0f} commands to {:.0f} robot packages, {:.0f} gaps in their sequence; {:.1f} Hz\n",
       number(s, "arm_commands"), number(s, "robot_packages"), number(s, "sequence_gaps"), number(s, "arm_rate_hz"));
   add(out, "  hand              {:.0f} commands, {:.1f} Hz\n", number(s, "hand_commands"), number(s, "hand_rate_hz"));
-  add(out, "  real time         {:.0f} heap allocations on real-time threads, {:.0f} holds ({:.0f} re-engaged)\n",
-      number(s, "rt_heap_allocations"), number(s, "holds"), number(s, "re_engagements"));
+  add(out,
+      "  real time         {:.0f} heap allocations on real-time threads, {:.0f} holds and stops ({:.0f} re-engaged, "
+      "{:.0f} reset)\n",
+      number(s, "rt_heap_allocations"), number(s, "holds"), number(s, "re_engagements"), number(s, "resets"));
   add_residuals(out, s.value("marker_residual_mm", json::object()));
   add_latency(out, s.value("latency_us", json::object()));
   add(out, "  plant vs target   arm {:.1f} mm and {:.3f} rad (p95) at {:.0f} ms lag, path ratio {:.3f}\n",

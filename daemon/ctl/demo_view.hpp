@@ -8,7 +8,8 @@ namespace embody::ctl {
 struct DemoProgress {
   double elapsed_s{0.0};  ///< of the playback
   double duration_s{0.0};
-  int re_engagements{0};  ///< holds that the demo ended as an operator would
+  int re_engagements{0};  ///< holds and stops after which the demo engaged again, as an operator would
+  int resets{0};          ///< stops that the demo reset
 };
 
 /// The live table. Members that are missing show as a dash.
@@ -17,9 +18,9 @@ struct DemoProgress {
 [[nodiscard]] std::string live_line(const std::string& status, const DemoProgress& progress);
 
 /// The summary for programs: one JSON object with the keys that docs/demo.md lists. `played_s`: time over which the
-/// rates are means; `commands_before` and `after`: statuses at its ends.
+/// rates are means; `status_before` and `status_after` are from its ends.
 [[nodiscard]] std::string summary_json(const std::string& report, const std::string& status_before,
-                                       const std::string& status_after, double played_s, int re_engagements);
+                                       const std::string& status_after, double played_s, const DemoProgress& progress);
 /// The summary for people.
 [[nodiscard]] std::string summary_text(const std::string& summary);
 

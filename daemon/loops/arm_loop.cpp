@@ -11,25 +11,28 @@ using transport::now;
 
 void ArmLoop::run() noexcept {
   TimePoint t_stop{};
-  while (true) {
-    wait_for_input(arm_.fd(), -1, 2 * config_.period);
+  bool still = false;
+  while (!still) {
+    wait_for_input(arm_.fd(), -1, 2 * period_);
     edges_.heartbeats.arm.fetch_add(1, std::memory_order_relaxed);
     read_packages();
     if (!edges_.stop.load(std::memory_order_relaxed)) continue;
     if (t_stop == TimePoint{}) t_stop = now();
-    const bool still = !arm_alive_ || (!commanding_ && machine_.state().mode == Mode::kStopped);
-    if (still || now() - t_stop > kStopTime) break;
+    still = !arm_alive_ || (!commanding_ && machine_.state().mode == Mode::kStopped);
+    if (now() - t_stop > kStopTime) break;
   }
+  edges_.arm_still.store(still, std::memory_order_relaxed);
   edges_.arm_finished.store(true, std::memory_order_release);
 }
 
-/// Every package is answered by one command. After a stall of this machine the backlog is worked off in order, but at
-/// most kBurst packages of it; older ones are passed over and counted.
+/// Every package is answered by one command, in order, so that the sequence has no gap. A backlog after a stall of this
+/// machine is worked off in bursts; the driver refuses answers to packages older than a command's lifetime.
 void ArmLoop::read_packages() noexcept {
   constexpr int kBurst = 16;
   int packages = 0;
   if (arm_.with_loop()) {
     if (arm_.take_revoked()) return lose_arm();
+    if (t_session_ == TimePoint{}) begin_session();
     for (; packages < kBurst; ++packages) {
       const IoStatus status = arm_.driver().read(report_.state);
       if (status == IoStatus::kDisconnected) return lose_arm();
@@ -42,16 +45,28 @@ void ArmLoop::read_packages() noexcept {
   if (packages > 0) return;
   // Without a package a time-out is still a tick of the mode machine.
   const TimePoint t = now();
-  constexpr Duration kSilence = std::chrono::milliseconds(100);
-  if (arm_alive_ && t - t_package_ > kSilence) return lose_arm();
+  if (t_session_ != TimePoint{} && t - std::max(t_session_, t_package_) > (arm_alive_ ? kSilence : kFirstPackage)) {
+    return lose_arm();
+  }
   take_pose();
   step_modes(t);
 }
 
+void ArmLoop::begin_session() noexcept {
+  t_session_ = now();
+  if (arm_.info().rate_hz > 0.0) period_ = from_seconds(1.0 / arm_.info().rate_hz);
+}
+
+/// Nothing of a session outlives it: a new one starts from what the robot then says.
 void ArmLoop::lose_arm() noexcept {
   if (arm_.with_loop()) arm_.give_back();
+  t_session_ = TimePoint{};
   arm_alive_ = false;
   commanding_ = false;
+  tracked_ = false;
+  engage_pending_ = false;
+  reachable_ = false;
+  controller_.halt();
   report_.state = {};
   last_controller_time_ = Duration{0};
   step_modes(now());
@@ -61,6 +76,10 @@ void ArmLoop::take_pose() noexcept {
   if (!edges_.pose_to_arm.update()) return;
   pose_is_new_ = true;
   const HandPose& pose = edges_.pose_to_arm.get();
+  if (last_pose_ != 0) {
+    edges_.counters.poses_superseded.fetch_add(pose.sequence - last_pose_ - 1, std::memory_order_relaxed);
+  }
+  last_pose_ = pose.sequence;
   streak_ = pose.streak;
   jumps_ = pose.jumps;
   if (!pose.valid) return;
@@ -70,17 +89,18 @@ void ArmLoop::take_pose() noexcept {
 
 void ArmLoop::tick(TimePoint t_tick) noexcept {
   const ArmState& state = report_.state;
+  const bool first = last_controller_time_ == Duration{0};
   const Duration elapsed = state.controller_time - last_controller_time_;
-  const Duration largest = 10 * config_.period;
-  const Duration dt =
-      last_controller_time_ == Duration{0} ? config_.period : std::clamp(elapsed, config_.period, largest);
-  if (last_controller_time_ != Duration{0} && elapsed > config_.period) {
-    const auto skipped = static_cast<std::uint64_t>((elapsed + config_.period / 2) / config_.period - 1);
+  // Set-points never move for longer than the robot's clock did; a clock that starts anew counts as one period.
+  const Duration dt = first || elapsed <= Duration{0} ? period_ : std::min(elapsed, 10 * period_);
+  if (!first && elapsed > period_) {
+    const auto skipped = static_cast<std::uint64_t>((elapsed + period_ / 2) / period_ - 1);
     edges_.counters.robot_packages_skipped.fetch_add(skipped, std::memory_order_relaxed);
   }
   last_controller_time_ = state.controller_time;
   t_package_ = state.t_arrival;
   const TimePoint t_robot = robot_clock_.map(state.controller_time, state.t_arrival);
+  t_expires_ = t_robot + config_.command_lifetime;
 
   take_pose();
   step_modes(t_tick);
@@ -96,7 +116,7 @@ void ArmLoop::step_modes(TimePoint t) noexcept {
   health.arm_connected = arm_alive_;
   health.arm = report_.state.condition;
   health.arm_following = arm_following(t);
-  health.arm_at_rest = controller_.at_rest();
+  health.arm_at_rest = controller_.at_rest() && (commanding_ || robot_at_rest());
   health.hand_connected = edges_.hand_ready.load(std::memory_order_relaxed);
   health.hand_jumped = jumps_ != jumps_engaged_;
   health.target_reachable = reachable_;
@@ -112,6 +132,11 @@ void ArmLoop::step_modes(TimePoint t) noexcept {
   edges_.mode_to_hand.publish(report_.mode);
   edges_.mode_to_main.publish(report_.mode);
   edges_.mode_to_telemetry.publish(report_.mode);
+}
+
+bool ArmLoop::robot_at_rest() const noexcept {
+  constexpr double kStill_rad_s = 0.02;
+  return report_.state.qd_rad_s.cwiseAbs().maxCoeff() < kStill_rad_s;
 }
 
 /// Whether the robot's program does what it should: it gets a grace to start tracking, but must not leave off.
@@ -146,7 +171,7 @@ void ArmLoop::send(const teleop::ArmReference& reference, TimePoint t_tick) noex
   command.q_rad = reference.q_rad;
   command.qd_rad_s = reference.qd_rad_s;
   command.t_capture = t_pose_;
-  command.t_expires = report_.state.t_arrival + config_.command_lifetime;
+  command.t_expires = t_expires_;
   report_.X_BEd = reference.X_BEd;
   const TimePoint t_computed = now();
   const IoStatus status = arm_.driver().write(command, t_computed);

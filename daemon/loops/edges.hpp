@@ -63,13 +63,14 @@ struct FingerTiming {
 /// Counters of the loops: written by one thread each, read by any.
 struct LoopCounters {
   std::atomic<std::uint64_t> frames_received{0};
-  std::atomic<std::uint64_t> frames_used{0};  ///< stepped through the hand-pose path
+  std::atomic<std::uint64_t> frames_used{0};  ///< of these: with a valid, plausible hand pose
   std::atomic<std::uint64_t> poses_invalid{0};
   std::atomic<std::uint64_t> finger_frames{0};
   std::atomic<std::uint64_t> finger_skipped{0};
   std::atomic<std::uint64_t> robot_packages{0};
   std::atomic<std::uint64_t> robot_packages_skipped{
-      0};  ///< missing in the robot's time stamps, or passed over in a backlog
+      0};                                          ///< missing in the robot's time stamps, or passed over in a backlog
+  std::atomic<std::uint64_t> poses_superseded{0};  ///< never seen by the arm loop: a newer one came first
   std::atomic<std::uint64_t> arm_commands{0};
   std::atomic<std::uint64_t> arm_commands_dropped{0};  ///< expired or the kernel's buffer was full
   std::atomic<std::uint64_t> hand_commands{0};
@@ -110,7 +111,9 @@ struct Edges {
   LoopCounters counters;
   Heartbeats heartbeats;
   std::atomic<bool> hand_ready{false};    ///< the hand has answered in this session
-  std::atomic<bool> arm_finished{false};  ///< after stop: the arm stands still and is disarmed
+  std::atomic<bool> arm_finished{false};  ///< after stop: the arm loop has ended
+  std::atomic<bool> arm_still{false};     ///< then: the arm was disarmed or gone, not given up on
+  std::atomic<bool> failed{false};        ///< a thread for upkeep ended by an exception
   std::atomic<bool> watchdog_bit{false};  ///< a loop was found hung; latched
   std::atomic<bool> stop{false};          ///< all loops end
 };

@@ -75,7 +75,8 @@ void HandLoop::stop_motors() noexcept {
 
 void HandLoop::lose_hand() noexcept {
   edges_.hand_ready.store(false, std::memory_order_relaxed);
-  report_.state = {};
+  report_ = {};
+  edges_.hand_to_telemetry.publish(report_);
   baton_.give_back();
 }
 

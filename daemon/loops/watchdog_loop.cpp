@@ -11,7 +11,7 @@ void WatchdogLoop::run() noexcept {
   Watch tracker;
   Watch hand;
   TimePoint t_last = transport::now();
-  while (!edges_.stop.load(std::memory_order_relaxed)) {
+  while (!edges_.arm_finished.load(std::memory_order_relaxed)) {
     wait_for_input(-1, -1, kPeriod);
     edges_.heartbeats.watchdog.fetch_add(1, std::memory_order_relaxed);
     const TimePoint t = transport::now();
@@ -19,10 +19,11 @@ void WatchdogLoop::run() noexcept {
     if (t - t_last > 2 * kPeriod) arm = tracker = hand = {};
     t_last = t;
     const bool arm_hung = hung(arm, edges_.heartbeats.arm, t);
-    const bool any_hung =
-        hung(tracker, edges_.heartbeats.tracker, t) | hung(hand, edges_.heartbeats.hand, t) | arm_hung;
-    if (any_hung) edges_.watchdog_bit.store(true, std::memory_order_relaxed);
-    if (arm_hung && arm_.fd() >= 0) ::shutdown(arm_.fd(), SHUT_RDWR);
+    // At a stop the other loops end first; the arm loop is watched until it has braked.
+    const bool stopping = edges_.stop.load(std::memory_order_relaxed);
+    const bool others_hung = hung(tracker, edges_.heartbeats.tracker, t) | hung(hand, edges_.heartbeats.hand, t);
+    if (arm_hung || (others_hung && !stopping)) edges_.watchdog_bit.store(true, std::memory_order_relaxed);
+    if (const int fd = arm_.fd(); arm_hung && fd >= 0) ::shutdown(fd, SHUT_RDWR);
   }
 }
 

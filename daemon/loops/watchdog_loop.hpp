@@ -7,8 +7,9 @@ namespace embody {
 class WatchdogLoop {
  public:
   WatchdogLoop(const ArmBaton& arm, Edges& edges) noexcept : arm_(arm), edges_(edges) {}
-  /// Until edges.stop. On a hung arm, tracker or hand loop: latches edges.watchdog_bit (mode *stopped*, and main stops
-  /// feeding systemd's watchdog), and for the arm loop shuts the robot's socket, so that the robot brakes by itself.
+  /// Until the arm loop has ended. On a hung arm, tracker or hand loop: latches edges.watchdog_bit (mode *stopped*, and
+  /// main stops feeding systemd's watchdog), and for the arm loop shuts the robot's socket, so that the robot brakes by
+  /// itself.
   void run() noexcept;
 
  private:

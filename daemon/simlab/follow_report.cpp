@@ -11,6 +11,7 @@ namespace embody::sim {
 namespace {
 
 constexpr Duration kLagStep = std::chrono::milliseconds(2);
+constexpr Duration kTolerance = std::chrono::milliseconds(500);
 constexpr Duration kGrid = std::chrono::milliseconds(10);  // at which the plants are compared
 
 /// Frame of `recording` in the slots of the glove.
@@ -218,6 +219,14 @@ FollowReport judge(const std::vector<TargetSample>& targets, const std::vector<U
     return report;
   }
   report.judged_s = to_seconds(end - begin);
+  if (criteria.planned - (end - t_start) > kTolerance) {
+    report.reason = "the recording was not sent to its end: the tracker's connection was lost";
+    return report;
+  }
+  if (arm.back().t < end - kTolerance || hand.empty() || hand.back().t < end - kTolerance) {
+    report.reason = "the log of the simulated robot ends before the recording";
+    return report;
+  }
   judge_engagement(arm, begin, end, report);
   judge_arm(targets, flange_path(arm, begin, end), criteria, report);
   judge_hand(targets, hand, begin, end, criteria, report);

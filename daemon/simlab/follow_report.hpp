@@ -22,6 +22,7 @@ struct FollowCriteria {
   double hand_p95_rad{0.15};
   double path_ratio_min{0.9};
   double path_ratio_max{1.1};
+  Duration planned{0};       ///< length of the recording; 0: whatever was sent
   double engaged_min{0.95};  ///< part of the judged time in which the control program tracked
 };
 

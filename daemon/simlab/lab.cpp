@@ -128,7 +128,9 @@ Status Lab::fault(const std::string& command) {
 
 std::string Lab::report_json() const {
   const std::vector<SentFrame> sent = qtm_.log();
-  const FollowReport report = judge(ungated_targets(models_, recording_, sent), ur_.samples(), mia_.log());
+  FollowCriteria criteria;
+  criteria.planned = from_seconds(static_cast<double>(recording_.frames.size()) / recording_.rate_hz);
+  const FollowReport report = judge(ungated_targets(models_, recording_, sent), ur_.samples(), mia_.log(), criteria);
   const UrCounters ur = ur_.counters();
   const UrSample arm = ur_.latest();
   const MiaSimulatorCounters mia = mia_.counters();

@@ -104,7 +104,7 @@ int run(sim::Lab& lab, StopSignals& signals, bool wait_for_play) {
       say({{"event", "playback_finished"}});
     }
   }
-  StopSignals::restore();
+  signals.restore();
   say({{"event", "report"}, {"report", json::parse(lab.report_json())}});
   return kExitOk;
 }

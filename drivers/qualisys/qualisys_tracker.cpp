@@ -7,10 +7,10 @@
 #include <atomic>
 #include <utility>
 
+#include "core/base/names.hpp"
 #include "core/teleop/clock_map.hpp"
 #include "drivers/qualisys/parameters.hpp"
 #include "drivers/qualisys/rt_connection.hpp"
-#include "core/base/names.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
 

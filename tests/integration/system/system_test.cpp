@@ -206,7 +206,7 @@ TEST(System, SigtermAndCtrlCStopArmAndHandCleanly) {
     const json report = rig.report();
     EXPECT_FALSE(report["arm_now"]["tracking"]);
     EXPECT_GE(report["mia"]["stops"].get<int>(), 1);
-    EXPECT_NE(rig.daemon_log().find("stand still"), std::string::npos);
+    EXPECT_NE(rig.daemon_log().find("the arm stands still"), std::string::npos);
   }
 }
 

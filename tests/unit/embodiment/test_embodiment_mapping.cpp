@@ -5,8 +5,8 @@
 #include <random>
 
 #include "core/embodiment/embodiment_mapping.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/embodiment/mia_config.hpp"
-#include "tests/unit/robot/heap_counter.hpp"
 
 namespace embody {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/hand/hand_pose_estimator.hpp"
-#include "tests/unit/hand/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/hand/real_recording.hpp"
 #include "tests/unit/math/random_values.hpp"
 

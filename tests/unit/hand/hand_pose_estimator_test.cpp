@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "tests/unit/hand/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/hand/real_recording.hpp"
 #include "tests/unit/math/random_values.hpp"
 

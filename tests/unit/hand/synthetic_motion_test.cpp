@@ -7,7 +7,7 @@
 
 #include "core/hand/finger_estimator.hpp"
 #include "core/hand/hand_pose_estimator.hpp"
-#include "tests/unit/hand/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/hand/real_recording.hpp"
 
 namespace embody::hand {

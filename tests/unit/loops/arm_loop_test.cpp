@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/unit/loops/fakes.hpp"
-#include "tests/unit/teleop/arm_rig.hpp"
+#include "tests/unit/loops/arm_bench.hpp"
 
 namespace embody {
 namespace {
@@ -12,95 +11,11 @@ using safety::Cause;
 using safety::Mode;
 using safety::RequestKind;
 using std::chrono::milliseconds;
-using test::eventually;
+using test::ArmBench;
+using test::engaged_script;
 using test::FakeArm;
-using transport::now;
-
-/// Times so long that a busy machine changes nothing.
-ArmLoopConfig patient() {
-  ArmLoopConfig config;
-  config.command_lifetime = std::chrono::seconds(10);
-  config.arming_grace = std::chrono::seconds(10);
-  return config;
-}
-safety::ModeConfig patient_modes() {
-  safety::ModeConfig config;
-  config.hold_after = std::chrono::seconds(10);
-  config.stop_after = std::chrono::seconds(20);
-  return config;
-}
-
-/// An arm loop with a fake arm, a tracker that is there, and a hand that has answered. Scripts run on the loop's
-/// thread, once for each read() of the arm.
-class ArmBench {
- public:
-  explicit ArmBench(const ArmLoopConfig& config = patient(), const safety::ModeConfig& modes = patient_modes())
-      : tracker_baton(tracker),
-        arm_baton(arm),
-        cell(test::cell_config(teleop::Clutch::kAbsolute)),
-        loop(arm_baton, tracker_baton, cell, modes, config, edges) {
-    tracker.fd = arm.fd = ready.get();
-    tracker_baton.pass_to_loop(*tracker.connect());
-    arm.state.condition = ArmCondition::kReady;
-    arm.state.controller_time = std::chrono::seconds(3);
-    arm.state.q_rad = test::usual_posture();
-    edges.hand_ready = true;
-    X_BE_goal = robot::forward_kinematics(test::usual_posture());
-  }
-  /// From the goal of the flange to the pose of the hand that means it, captured now.
-  void publish_pose() {
-    HandPose pose;
-    pose.valid = true;
-    pose.streak = 100;
-    pose.jumps = jumps;
-    pose.sequence = ++poses;
-    pose.t_capture = pose.t_arrival = now();
-    pose.X_WM = cell.X_BW.inverse() * X_BE_goal * cell.X_EP * cell.X_PM;
-    edges.pose_to_arm.publish(pose);
-  }
-  void ask(RequestKind kind) { edges.requests.push({kind, ++requests}); }
-  /// Ends the loop the way the daemon does: it runs on until the arm stands still.
-  void shut_down() {
-    if (edges.stop) return;
-    ask(RequestKind::kShutdown);
-    edges.stop = true;
-  }
-  safety::ModeState mode() {
-    edges.mode_to_main.update();
-    return edges.mode_to_main.get();
-  }
-  /// Connects and runs the loop to its end on a thread of its own; returns its heap uses.
-  std::uint64_t run() {
-    arm_baton.pass_to_loop(*arm.connect());
-    test::WatchedThread thread(edges.stop, [this] { loop.run(); });
-    EXPECT_TRUE(thread.started());
-    return thread.join();
-  }
-
-  test::EventFd ready{true};
-  test::FakeTracker tracker;
-  FakeArm arm;
-  Edges edges;
-  TrackerBaton tracker_baton;
-  ArmBaton arm_baton;
-  teleop::ArmControllerConfig cell;
-  Pose X_BE_goal{Pose::Identity()};
-  std::uint64_t poses{0};
-  std::uint32_t jumps{0};
-  std::uint32_t requests{0};
-  ArmLoop loop;
-};
-
-/// A pose with every package, an engage request with the tenth, and `after(n)` decides about each later package.
-template <class After>
-std::function<IoStatus()> engaged_script(ArmBench& bench, After after) {
-  return [&bench, after, n = 0]() mutable {
-    ++n;
-    bench.publish_pose();
-    if (n == 10) bench.ask(RequestKind::kEngage);
-    return n <= 10 ? IoStatus::kDone : after(n);
-  };
-}
+using test::patient;
+using test::patient_modes;
 
 TEST(ArmLoop, AnswersEachPackageWithExactlyOneCommandInOrder) {
   ArmBench bench;
@@ -243,6 +158,35 @@ TEST(ArmLoop, ReachesTheHandAndStampsCommandsWithTheirMeasurement) {
   expect_limits(bench);
 }
 
+TEST(ArmLoop, SetsTheClutchWhenItEngages) {
+  ArmBench bench(patient(), patient_modes(), teleop::Clutch::kRelative);
+  bench.X_BE_goal.translation() += Eigen::Vector3d(0.2, 0.3, -0.1);  // the hand rests elsewhere
+  bench.arm.script = engaged_script(bench, [&](int n) {
+    if (n == 1000) bench.shut_down();
+    return IoStatus::kDone;
+  });
+  bench.run();
+  EXPECT_EQ(bench.arm.answers[900].command.action, ArmAction::kTrack);
+  EXPECT_LT((bench.arm.answers[900].command.q_rad - test::usual_posture()).norm(), 1e-9);
+}
+
+TEST(ArmLoop, FollowsNoPoseThatIsNotValid) {
+  ArmBench bench;
+  int n = 0;
+  bench.arm.script = [&] {
+    if (++n == 100) bench.X_BE_goal.translation().z() -= 0.1;
+    bench.valid = n < 100;
+    bench.publish_pose();
+    if (n == 10) bench.ask(RequestKind::kEngage);
+    if (n == 1000) bench.shut_down();
+    return IoStatus::kDone;
+  };
+  bench.run();
+  EXPECT_EQ(bench.arm.answers[900].command.action, ArmAction::kTrack);
+  EXPECT_LT((bench.arm.answers[900].command.q_rad - test::usual_posture()).norm(), 1e-9);
+  EXPECT_LT(bench.arm.answers[900].command.t_capture, bench.arm.answers[100].t_arrival) << "the newest valid pose";
+}
+
 TEST(ArmLoop, WaitsForTheRobotsProgramToFollowAndHoldsWhenItNeverDoes) {
   ArmLoopConfig config = patient();
   config.arming_grace = milliseconds(20);
@@ -313,99 +257,6 @@ TEST(ArmLoop, DisarmsInTheTickOfAProtectiveStop) {
   for (std::size_t i = 99; i < bench.arm.answers.size(); ++i) {
     ASSERT_EQ(bench.arm.answers[i].command.action, ArmAction::kHold) << i;
   }
-}
-
-TEST(ArmLoop, GivesALostArmBackAndStops) {
-  ArmBench bench;
-  bench.arm.script = engaged_script(bench, [&](int n) {
-    if (n < 100) return IoStatus::kDone;
-    bench.edges.stop = true;
-    return IoStatus::kDisconnected;
-  });
-  EXPECT_EQ(bench.run(), 0U) << "heap uses";
-  EXPECT_TRUE(bench.arm_baton.with_links());
-  EXPECT_EQ(bench.arm_baton.fd(), -1);
-  EXPECT_EQ(bench.mode().mode, Mode::kStopped);
-  EXPECT_EQ(bench.mode().cause, Cause::kArmLost);
-  EXPECT_EQ(bench.mode().holds, 1U);
-}
-
-TEST(ArmLoop, GivesBackAnArmThatFallsSilent) {
-  ArmBench bench;
-  bench.arm.script = engaged_script(bench, [&](int n) {
-    if (n < 100) return IoStatus::kDone;
-    if (n > 101 && bench.mode().mode == Mode::kStopped) bench.edges.stop = true;
-    return IoStatus::kEmpty;
-  });
-  bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
-  EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); }));
-  bench.edges.stop = true;
-  thread.join();
-  EXPECT_EQ(bench.mode().mode, Mode::kStopped);
-  EXPECT_EQ(bench.mode().cause, Cause::kArmLost);
-}
-
-TEST(ArmLoop, DISABLED_GivesBackAnArmThatNeverSendsAPackage) {
-  ArmBench bench;
-  bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
-  EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); })) << "links would never connect again";
-  bench.edges.stop = true;
-  thread.join();
-}
-
-TEST(ArmLoop, GivesTheArmBackWhenLinksRevokeIt) {
-  ArmBench bench;
-  bench.arm.script = engaged_script(bench, [&](int n) {
-    if (n == 100) bench.arm_baton.revoke();
-    return IoStatus::kDone;
-  });
-  bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
-  EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); }));
-  bench.edges.stop = true;
-  thread.join();
-  EXPECT_EQ(bench.mode().mode, Mode::kStopped);
-}
-
-TEST(ArmLoop, DISABLED_CommandsNothingInANewSessionBeforeTheOperatorEngages) {
-  ArmBench bench;
-  bench.X_BE_goal.translation() += Eigen::Vector3d(0.05, 0.04, -0.20);
-  int n = 0;
-  bench.arm.script = [&] {
-    bench.publish_pose();
-    if (++n == 10) bench.ask(RequestKind::kEngage);
-    if (n == 300) return IoStatus::kDisconnected;  // in full motion
-    if (n == 600) bench.shut_down();
-    return IoStatus::kDone;
-  };
-  bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
-  EXPECT_TRUE(eventually([&] { return bench.arm_baton.with_links(); }));
-  bench.arm.state.q_rad += Vector6::Constant(0.05);  // where the robot braked by itself
-  const Vector6 q_stopped = bench.arm.state.q_rad;
-  bench.arm_baton.pass_to_loop(*bench.arm.connect());
-  thread.join();
-  std::size_t tracking = 0;
-  for (const FakeArm::Answer& answer : bench.arm.answers) {
-    if (answer.session == 2 && answer.command.action == ArmAction::kTrack) ++tracking;
-  }
-  EXPECT_EQ(tracking, 0U) << "tracking commands in mode stopped";
-  EXPECT_LT((bench.arm.state.q_rad - q_stopped).norm(), 1e-12) << "the robot was moved";
-}
-
-TEST(ArmLoop, StillDecidesRequestsAndTicksTheModeWithoutAnArm) {
-  ArmBench bench;
-  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
-  bench.ask(RequestKind::kEngage);
-  EXPECT_TRUE(eventually([&] { return bench.mode().request_id == 1; }));
-  EXPECT_FALSE(bench.mode().request_accepted);
-  EXPECT_EQ(bench.mode().mode, Mode::kOffline);
-  const std::uint64_t beats = bench.edges.heartbeats.arm;
-  EXPECT_TRUE(eventually([&] { return bench.edges.heartbeats.arm > beats + 10; }));
-  bench.edges.stop = true;
-  EXPECT_EQ(thread.join(), 0U) << "heap uses";
 }
 
 }  // namespace

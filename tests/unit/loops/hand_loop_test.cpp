@@ -180,6 +180,7 @@ TEST(HandLoop, IsReadyOnlyWhenTheHandHasAnswered) {
   bench.run();
   EXPECT_FALSE(bench.edges.hand_ready);
   EXPECT_EQ(bench.edges.counters.hand_commands, 0U);
+  for (const HandCommand& command : bench.commands) ASSERT_EQ(command.joint_count, 3U) << "the bus needs a cycle";
 }
 
 TEST(HandLoop, BeatsWithoutAHand) {

@@ -59,6 +59,7 @@ Outcome watch(Hung hung, Duration duration) {
     std::this_thread::yield();
   }
   edges.stop = true;
+  edges.arm_finished = true;
   outcome.heap_uses = thread.join();
   outcome.socket_shut = robot_sees_the_end();
   return outcome;

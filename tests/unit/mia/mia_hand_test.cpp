@@ -7,7 +7,7 @@
 
 #include "drivers/sim/mia/pty.hpp"
 #include "drivers/transport/tty.hpp"
-#include "tests/unit/mia/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/mia/rig.hpp"
 
 namespace embody::test {

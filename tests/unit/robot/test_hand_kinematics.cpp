@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/robot/hand_kinematics.hpp"
-#include "tests/unit/robot/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/robot/mia_urdf.hpp"
 
 namespace embody::robot {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "core/robot/ur_kinematics.hpp"
-#include "tests/unit/robot/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 
 namespace embody::robot {
 namespace {

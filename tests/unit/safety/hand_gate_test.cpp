@@ -152,7 +152,7 @@ TEST(HandGate, StartsAfreshFromTheMeasuredAnglesAfterEveryInterruption) {
   }
 }
 
-TEST(HandGate, DISABLED_NeverCommandsAnAngleThatIsNotFinite) {
+TEST(HandGate, NeverCommandsAnAngleThatIsNotFinite) {
   HandGate gate({});
   Moment moment;
   moment.measured.q_rad = {kNan, 0.3, 0.4};

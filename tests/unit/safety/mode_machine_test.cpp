@@ -243,7 +243,7 @@ TEST(ModeMachine, ResetsNeitherAHungLoopNorAShutdown) {
   EXPECT_EQ(down.machine.state().mode, S);
 }
 
-TEST(ModeMachine, DISABLED_AShutdownStaysAShutdownWhenTheOperatorAlsoStops) {
+TEST(ModeMachine, AShutdownStaysAShutdownWhenTheOperatorAlsoStops) {
   ModeBench bench;
   bench.go_to(E);
   bench.fresh_tick(RequestKind::kShutdown);
@@ -252,7 +252,7 @@ TEST(ModeMachine, DISABLED_AShutdownStaysAShutdownWhenTheOperatorAlsoStops) {
   EXPECT_EQ(bench.machine.state().mode, S);
 }
 
-TEST(ModeMachine, DISABLED_ChangesTheModeOnceInATickWhenTwoThingsGoWrongTogether) {
+TEST(ModeMachine, ChangesTheModeOnceInATickWhenTwoThingsGoWrongTogether) {
   ModeBench bench;
   bench.go_to(E);
   const std::uint32_t epoch = bench.machine.state().epoch;

@@ -112,4 +112,19 @@ inline double angle(const Pose& a, const Pose& b) {
   return math::angle_between(a.linear(), b.linear());
 }
 
+inline ArmRig::Path resting_at(const Pose& X_BE) {
+  return [X_BE](double) { return X_BE; };
+}
+
+/// A hand that moves smoothly around a flange pose.
+inline ArmRig::Path waving_around(const Pose& X_BE, double amplitude_m, double amplitude_rad, double omega) {
+  return [=](double t_s) {
+    Pose X = X_BE;
+    const double s = 0.5 - 0.5 * std::cos(omega * std::max(0.0, t_s));
+    X.translation() += amplitude_m * s * Eigen::Vector3d(0.6, -0.8, 0.3);
+    X.linear() = X_BE.linear() * math::exp_so3(amplitude_rad * s * Eigen::Vector3d(0.3, 0.5, -0.4));
+    return X;
+  };
+}
+
 }  // namespace embody::test

@@ -118,7 +118,7 @@ TEST(PoseMonitor, NeverAcceptsJumpsThatDoNotAgree) {
   for (int k = 0; k < 100; ++k) ASSERT_FALSE(stream.step(k % 2 == 0 ? kFarAway : kElsewhere).valid) << k;
 }
 
-TEST(PoseMonitor, DISABLED_AcceptsOnlyThePlaceThatThePosesAgreedOn) {
+TEST(PoseMonitor, AcceptsOnlyThePlaceThatThePosesAgreedOn) {
   Stream stream;
   for (int k = 0; k < 10; ++k) stream.step(kHere);
   for (int k = 0; k < 5; ++k) stream.step(kThere);
@@ -134,7 +134,7 @@ TEST(PoseMonitor, StartsTheStreakAnewAfterAnInvalidPoseAndAfterAGap) {
   EXPECT_EQ(stream.step(kHere, milliseconds(51)).streak, 1U);
 }
 
-TEST(PoseMonitor, DISABLED_RefusesAPoseThatIsNotFinite) {
+TEST(PoseMonitor, RefusesAPoseThatIsNotFinite) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   Stream stream;
   EXPECT_FALSE(stream.step({nan, 0.0, 0.0}).valid) << "the very first pose";

@@ -10,7 +10,7 @@
 
 #include "drivers/sim/ur/ur_controller.hpp"
 #include "tests/unit/ur_rtde/arm_loop.hpp"
-#include "tests/unit/ur_rtde/heap_counter.hpp"
+#include "tests/support/heap_counter.hpp"
 
 namespace embody {
 namespace {
