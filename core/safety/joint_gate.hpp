@@ -11,6 +11,13 @@ struct JointLimits {
   Vector6 upper_rad{Vector6::Constant(6.28318530717958648)};
 };
 
+/// Limits of the flange at the present configuration.
+struct FlangeLimit {
+  Eigen::Matrix<double, 6, 6> J;  ///< flange twist (m/s, then rad/s) = J * joint speeds
+  double speed_m_s{0.0};
+  double speed_rad_s{0.0};
+};
+
 /// A set-point that follows a target with feed-forward. The wanted closing speed is at most sqrt(a |d|), half of the
 /// available deceleration a (the rest is left for the feed-forward), kGain |d|, which does not chatter, and the
 /// greatest speed from which the set-point still stops at the target. The same bound holds against both joint limits,
@@ -22,12 +29,10 @@ class JointGate {
   /// Starts from rest at `q_rad`.
   void reset(const Vector6& q_rad) noexcept;
   /// One tick of `dt` towards `q_d` moving with `qd_d`. Non-finite targets brake. Targets beyond the joint limits are
-  /// clamped to them. Cost: six square roots.
-  void follow(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s) noexcept;
-  /// The two halves of follow(), for a caller that bounds the wanted speeds further: what the joints should do ...
-  [[nodiscard]] Vector6 wanted_speed(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s) const noexcept;
-  /// ... and one tick of doing it within speed, acceleration and range.
-  void move(const Vector6& wanted_rad_s, double dt_s) noexcept;
+  /// clamped to them. With `flange`, the joint speeds are also kept to its limits, as far as acceleration and range
+  /// allow.
+  void follow(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s,
+              const FlangeLimit* flange = nullptr) noexcept;
   /// One tick of braking with the full deceleration.
   void brake(double dt_s) noexcept;
 
@@ -37,6 +42,11 @@ class JointGate {
   [[nodiscard]] const JointLimits& limits() const noexcept { return limits_; }
 
  private:
+  [[nodiscard]] Vector6 wanted_speed(const Vector6& q_d_rad, const Vector6& qd_d_rad_s, double dt_s) const noexcept;
+  [[nodiscard]] Vector6 keep_flange_limit(const Vector6& qd_rad_s, double dt_s,
+                                          const FlangeLimit& flange) const noexcept;
+  void move(const Vector6& wanted_rad_s, double dt_s, const FlangeLimit* flange) noexcept;
+
   static constexpr double kGain = 30.0;  // 1/s
 
   JointLimits limits_;

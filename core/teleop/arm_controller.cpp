@@ -68,19 +68,12 @@ ArmReference ArmController::follow(TimePoint now, double dt_s) noexcept {
     q_d_rad_ = *q;
     X_BEr_ = X_BEn;
   }
-  const Vector6 wanted = gate_.wanted_speed(q_d_rad_, qd_d, dt_s);
-  gate_.move(wanted * flange_scale(wanted), dt_s);
+  const safety::FlangeLimit flange{robot::jacobian(gate_.q_rad()), config_.speed_m_s, config_.speed_rad_s};
+  gate_.follow(q_d_rad_, qd_d, dt_s, &flange);
   reference.q_rad = gate_.q_rad();
   reference.qd_rad_s = gate_.qd_rad_s();
   reference.reachable = solved && inside(config_.workspace_B, X_BEd_.translation());
   return reference;
-}
-
-/// Part of the joint speeds `qd` at which the flange keeps its speed limits: catching up must not exceed them either.
-double ArmController::flange_scale(const Vector6& qd_rad_s) const noexcept {
-  const Vector6 twist = robot::jacobian(gate_.q_rad()) * qd_rad_s;
-  return std::min({1.0, config_.speed_m_s / std::max(twist.head<3>().norm(), 1e-12),
-                   config_.speed_rad_s / std::max(twist.tail<3>().norm(), 1e-12)});
 }
 
 ArmReference ArmController::brake(double dt_s) noexcept {

@@ -67,7 +67,6 @@ class ArmController {
   /// Flange target without clutch at the robot's present, `resample_delay` in the past; nothing without poses.
   [[nodiscard]] std::optional<Pose> target(TimePoint now) const noexcept;
   void shrink_offset(double dt_s) noexcept;
-  [[nodiscard]] double flange_scale(const Vector6& qd_rad_s) const noexcept;
   [[nodiscard]] Pose limit_step(const Pose& X_BEd, double dt_s) const noexcept;
 
   ArmControllerConfig config_;

@@ -183,7 +183,7 @@ TEST(FollowReport, AHandThatDoesNotMoveHasNotFollowed) {
   expect_failure(scene, "hand joint error (p95)");
   scene = {};
   scene.hand_log_end_s = -0.5;  // the hand was never heard of
-  expect_failure(scene, "hand joint error (p95)");
+  expect_failure(scene, "the log of the simulated robot ends before the recording");
 }
 
 TEST(FollowReport, NeedsFramesAndARobot) {
