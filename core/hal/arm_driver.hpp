@@ -27,6 +27,8 @@ class ArmDriver {
   virtual IoStatus read(ArmState& state) noexcept = 0;
   /// Sends `command` unless it has expired at `now`.
   virtual IoStatus write(const ArmCommand& command, TimePoint now) noexcept = 0;
+  /// Why the last session ended, for people; empty while it lasts. Call it from the owner of the driver.
+  [[nodiscard]] virtual std::string_view reason() const noexcept = 0;
 };
 
 }  // namespace embody

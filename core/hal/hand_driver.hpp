@@ -29,6 +29,8 @@ class HandDriver {
   virtual IoStatus read(HandDeviceState& state) noexcept = 0;
   /// Starts the exchange of one cycle (targets, then a position request) unless the command has expired at `now`.
   virtual IoStatus write(const HandCommand& command, TimePoint now) noexcept = 0;
+  /// Why the last session ended, for people; empty while it lasts. Call it from the owner of the driver.
+  [[nodiscard]] virtual std::string_view reason() const noexcept = 0;
 };
 
 }  // namespace embody

@@ -1,5 +1,7 @@
 #pragma once
 // What the daemon needs of a hand tracker, and nothing more.
+#include <string_view>
+
 #include "core/base/result.hpp"
 #include "core/hal/types.hpp"
 
@@ -34,6 +36,8 @@ class HandTracker {
   virtual Status service() = 0;
   /// Next buffered frame in order of arrival; call until kEmpty.
   virtual IoStatus read(MarkerFrame& frame) noexcept = 0;
+  /// Why the last session ended, for people; empty while it lasts. Call it from the owner of the driver.
+  [[nodiscard]] virtual std::string_view reason() const noexcept = 0;
 };
 
 }  // namespace embody

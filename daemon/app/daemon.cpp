@@ -60,8 +60,7 @@ safety::HandGateConfig hand_gate_config(const config::EmbodyConfig& config) {
 
 /// A link over one baton; `service` may be empty.
 template <class Driver, class Info>
-Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<std::string()> reason,
-               std::function<Status()> service) {
+Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<Status()> service) {
   Link link;
   link.name = name;
   link.with_links = [&baton] { return baton.with_links(); };
@@ -74,7 +73,7 @@ Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<std::
   };
   link.service = std::move(service);
   link.revoke = [&baton] { baton.revoke(); };
-  link.reason = std::move(reason);
+  link.reason = [&baton] { return std::string(baton.driver().reason()); };
   return link;
 }
 
@@ -126,14 +125,10 @@ Daemon::~Daemon() {
 }
 
 std::vector<Link> Daemon::make_links() {
-  auto& tracker = static_cast<qualisys::QualisysTracker&>(*tracker_);
-  auto& arm = static_cast<UrRtdeArm&>(*arm_);
   std::vector<Link> links;
-  links.push_back(make_link(
-      "tracker", tracker_baton_, [&tracker] { return std::string(tracker.last_error().view()); },
-      [&tracker] { return tracker.service(); }));
-  links.push_back(make_link("arm", arm_baton_, [&arm] { return std::string(arm.reason()); }, {}));
-  links.push_back(make_link("hand", hand_baton_, [] { return std::string("it no longer answers"); }, {}));
+  links.push_back(make_link("tracker", tracker_baton_, [this] { return tracker_->service(); }));
+  links.push_back(make_link("arm", arm_baton_, {}));
+  links.push_back(make_link("hand", hand_baton_, {}));
   return links;
 }
 

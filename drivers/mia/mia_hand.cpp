@@ -33,6 +33,11 @@ double MiaHand::thumb_opposition() const noexcept {
   return thumb_opposition_rad(index_delta_rad(config_.transmission.index, reply_.counts[at(Motor::kIndex)]));
 }
 
+std::string_view MiaHand::reason() const noexcept {
+  if (!lost_) return "";
+  return hung_up_ ? "the serial device is gone; is it unplugged?" : "the hand no longer answers; has it power?";
+}
+
 IoStatus MiaHand::read(HandDeviceState& state) noexcept {
   if (lost_) return IoStatus::kDisconnected;
   pump();

@@ -50,6 +50,7 @@ class MiaHand final : public HandDriver {
   Result<HandInfo> connect() override;
   IoStatus read(HandDeviceState& state) noexcept override;
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override;
+  [[nodiscard]] std::string_view reason() const noexcept override;
 
   [[nodiscard]] const MiaCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] bool stopped() const noexcept { return stop_.latched; }

@@ -42,8 +42,7 @@ class QualisysTracker final : public HandTracker {
   /// and is not allowed, or when bytes break the protocol.
   IoStatus read(MarkerFrame& frame) noexcept override;
 
-  /// Why read() returned kDisconnected. Call from the thread that calls read(), or after the session left it.
-  [[nodiscard]] const FixedString<240>& last_error() const noexcept { return last_error_; }
+  [[nodiscard]] std::string_view reason() const noexcept override { return last_error_.view(); }
 
  private:
   struct Session;

@@ -49,8 +49,7 @@ class UrRtdeArm : public ArmDriver {
   /// command has expired, or tracks a target that is not finite.
   IoStatus write(const ArmCommand& command, TimePoint now) noexcept override;
 
-  /// Why the last session ended, for people; empty while it lasts.
-  [[nodiscard]] std::string_view reason() const noexcept { return reason_.view(); }
+  [[nodiscard]] std::string_view reason() const noexcept override { return reason_.view(); }
   /// The last text message of the controller.
   [[nodiscard]] std::string_view last_text() const noexcept { return last_text_.view(); }
 

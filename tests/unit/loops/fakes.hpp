@@ -33,6 +33,7 @@ class FakeTracker : public HandTracker {
   Result<TrackerInfo> connect() override { return TrackerInfo{fd, 100.0, false, "fake tracker"}; }
   Status service() override { return {}; }
   IoStatus read(MarkerFrame& frame) noexcept override { return on_read(frame); }
+  [[nodiscard]] std::string_view reason() const noexcept override { return ""; }
 
   int fd{-1};
   std::function<IoStatus(MarkerFrame&)> on_read{[](MarkerFrame&) { return IoStatus::kEmpty; }};
@@ -49,6 +50,7 @@ class FakeHand : public HandDriver {
   }
   IoStatus read(HandDeviceState& state) noexcept override { return on_read(state); }
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override { return on_write(command, now); }
+  [[nodiscard]] std::string_view reason() const noexcept override { return ""; }
 
   int fd{-1};
   std::function<IoStatus(HandDeviceState&)> on_read{[](HandDeviceState&) { return IoStatus::kEmpty; }};
@@ -86,6 +88,7 @@ class FakeArm : public ArmDriver {
     out = state;
     return status;
   }
+  [[nodiscard]] std::string_view reason() const noexcept override { return ""; }
   IoStatus write(const ArmCommand& command, TimePoint now) noexcept override {
     IoStatus status = now > command.t_expires ? IoStatus::kRefused : IoStatus::kDone;
     if (status == IoStatus::kDone) status = on_write(command);

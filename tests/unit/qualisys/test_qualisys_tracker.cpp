@@ -178,7 +178,7 @@ TEST(QualisysTracker, EndsTheSessionWhenPlaybackStartsUninvited) {
   ASSERT_TRUE(info.ok()) << info.error().detail.c_str();
   MarkerFrame frame;
   EXPECT_EQ(next_frame(tracker, info->fd, frame), IoStatus::kDisconnected);
-  EXPECT_TRUE(contains(tracker.last_error().view(), "plays back"));
+  EXPECT_TRUE(contains(tracker.reason(), "plays back"));
 }
 
 TEST(QualisysTracker, ReportsALostServerAndConnectsAgain) {
@@ -191,7 +191,7 @@ TEST(QualisysTracker, ReportsALostServerAndConnectsAgain) {
   while (status == IoStatus::kDone) status = next_frame(*lab.tracker, fd, frame);
   EXPECT_EQ(status, IoStatus::kDisconnected);
   EXPECT_EQ(lab.tracker->read(frame), IoStatus::kDisconnected) << "it stays so";
-  EXPECT_FALSE(lab.tracker->last_error().empty());
+  EXPECT_FALSE(lab.tracker->reason().empty());
 
   const auto again = lab.tracker->connect();
   ASSERT_TRUE(again.ok()) << again.error().detail.c_str();
@@ -302,7 +302,7 @@ TEST(QualisysTracker, EndsTheSessionWhenTheNumberOfMarkersDiffersFromTheLabels) 
   ASSERT_TRUE(info.ok()) << info.error().detail.c_str();
   MarkerFrame frame;
   EXPECT_EQ(next_frame(tracker, info->fd, frame), IoStatus::kDisconnected);
-  EXPECT_TRUE(contains(tracker.last_error().view(), "5 markers but lists 6 labels")) << tracker.last_error().view();
+  EXPECT_TRUE(contains(tracker.reason(), "5 markers but lists 6 labels")) << tracker.reason();
 }
 
 TEST(QualisysTracker, SkipsEventsAndStaleDataDuringTheHandshake) {

@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "drivers/sim/ur/ur_controller.hpp"
-#include "tests/unit/ur_rtde/arm_loop.hpp"
 #include "tests/support/heap_counter.hpp"
+#include "tests/unit/ur_rtde/arm_loop.hpp"
 
 namespace embody {
 namespace {
