@@ -13,8 +13,7 @@ using control::Response;
 std::string explain(safety::RequestKind kind, const Decision& decision) {
   if (!decision.decided) return "the arm loop did not decide in time; nothing was done";
   const safety::ModeState& mode = decision.mode;
-  const std::string now =
-      std::string("mode is ") + safety::to_string(mode.mode) + ": " + safety::to_string(mode.refusal);
+  std::string now = std::string("mode is ") + safety::to_string(mode.mode) + ": " + safety::to_string(mode.refusal);
   if (mode.refusal == safety::Cause::kWatchdog) return now + "; restart the daemon";
   if (mode.mode != safety::Mode::kStopped || kind == safety::RequestKind::kReset) return now;
   return now + "; remove the cause, then reset";

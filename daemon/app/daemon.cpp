@@ -97,11 +97,11 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& confi
   dds.side = config::kSideNames[static_cast<std::size_t>(config.dds.side)];
   Result<DdsPublisher> publisher = DdsPublisher::create(dds);
   if (!publisher) return publisher.error();
-  return std::unique_ptr<Daemon>(new Daemon(config, std::move(*models), make_tracker(config), make_arm(config.arm),
+  return std::unique_ptr<Daemon>(new Daemon(config, *models, make_tracker(config), make_arm(config.arm),
                                             make_hand(config.hand), std::move(*publisher)));
 }
 
-Daemon::Daemon(const config::EmbodyConfig& config, Models models, std::unique_ptr<HandTracker> tracker,
+Daemon::Daemon(const config::EmbodyConfig& config, const Models& models, std::unique_ptr<HandTracker> tracker,
                std::unique_ptr<ArmDriver> arm, std::unique_ptr<HandDriver> hand, DdsPublisher publisher)
     : config_(config),
       tracker_(std::move(tracker)),

@@ -59,7 +59,7 @@ class Daemon {
   [[nodiscard]] std::string status_json();
 
  private:
-  Daemon(const config::EmbodyConfig& config, Models models, std::unique_ptr<HandTracker> tracker,
+  Daemon(const config::EmbodyConfig& config, const Models& models, std::unique_ptr<HandTracker> tracker,
          std::unique_ptr<ArmDriver> arm, std::unique_ptr<HandDriver> hand, DdsPublisher publisher);
   [[nodiscard]] std::vector<Link> make_links();
   /// `body` whose exceptions are logged and end the daemon in order.

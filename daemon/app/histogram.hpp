@@ -39,7 +39,7 @@ class Histogram {
   static std::size_t index(std::uint64_t ns) noexcept {
     if (ns < (1U << kBits)) return ns;
     const int shift = static_cast<int>(std::bit_width(ns)) - kBits - 1;
-    return static_cast<std::size_t>(((shift + 1) << kBits) + static_cast<int>((ns >> shift) - (1U << kBits)));
+    return (static_cast<std::size_t>(shift + 1) << kBits) + (ns >> shift) - (1U << kBits);
   }
   static std::uint64_t edge(std::size_t i) noexcept {
     if (i < (1U << kBits)) return i;

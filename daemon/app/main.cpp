@@ -4,10 +4,10 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
-#include <sys/prctl.h>
 #include <systemd/sd-daemon.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 
@@ -122,35 +122,35 @@ int run(const config::EmbodyConfig& config) {
   return exit_code;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   CLI::App app{"Drives a robot arm and a robotic hand with a person's own hand, in real time."};
   app.set_version_flag("--version", std::string("embodyd ") + kVersion);
   std::string config_file;
   bool print_config = false;
-  bool die_with_parent = false;
   app.add_option("--config", config_file,
                  "Configuration file (default: $EMBODY_CONFIG, /etc/embody/embody.toml, then the shipped one)");
   app.add_flag("--print-config", print_config, "Print the complete configuration in use and exit");
-  app.add_flag("--die-with-parent", die_with_parent, "End when the parent process ends (for demos and tests)");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitOk : kExitUsage;
   }
-  if (die_with_parent) ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  const Result<std::filesystem::path> path = config::find_config(config_file);
+  if (!path) return fail(path.error(), kExitConfiguration);
+  const Result<config::EmbodyConfig> config = config::load_config(*path);
+  if (!config) return fail(config.error(), kExitConfiguration);
+  if (!print_config) return run(*config);
+  std::cout << config::print_toml(*config);
+  return kExitOk;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
   try {
-    const Result<std::filesystem::path> path = config::find_config(config_file);
-    if (!path) return fail(path.error(), kExitConfiguration);
-    const Result<config::EmbodyConfig> config = config::load_config(*path);
-    if (!config) return fail(config.error(), kExitConfiguration);
-    if (print_config) {
-      std::cout << config::print_toml(*config);
-      return kExitOk;
-    }
-    return run(*config);
+    return run_program(argc, argv);
   } catch (const std::exception& error) {
-    return fail(make_error(Errc::kIo, "%s", error.what()), kExitFailed);
+    std::fprintf(stderr, "embodyd: %s\n", error.what());
+    return kExitFailed;
   }
 }

@@ -10,7 +10,7 @@
 namespace embody {
 namespace {
 
-constexpr std::size_t kStackSize = 512 * 1024;
+constexpr std::size_t kStackSize = std::size_t{512} * 1024;
 
 struct Attributes {
   pthread_attr_t value{};

@@ -1,7 +1,6 @@
 // embody-sim: the simulated lab. Events go to standard output and commands come from standard input, one per line, so
 // that a demo, a test or a person can drive it.
 #include <poll.h>
-#include <sys/prctl.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
@@ -111,7 +110,6 @@ int run(sim::Lab& lab, StopSignals& signals, bool wait_for_play) {
 
 int run_lab(const std::string& config_file, const sim::LabConfig& lab_config, bool wait_for_play) {
   StopSignals signals;
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   const Result<std::filesystem::path> path = config::find_config(config_file);
   if (!path) return fail(path.error());
   const Result<config::EmbodyConfig> config = config::load_config(*path);
@@ -127,9 +125,7 @@ int generate(const std::string& output, double duration_s, std::uint64_t seed) {
   return saved ? kExitOk : fail(saved.error());
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   CLI::App app{"The simulated lab of embody: QTM server, UR10e controller and Mia hand with real bytes on loopback."};
   app.set_version_flag("--version", std::string("embody-sim ") + kVersion);
   app.require_subcommand(1);
@@ -162,4 +158,15 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? kExitOk : kExitUsage;
   }
   return *generate_command ? generate(output, duration_s, seed) : run_lab(config_file, lab, wait_for_play);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "embody-sim: %s\n", error.what());
+    return kExitFailed;
+  }
 }
