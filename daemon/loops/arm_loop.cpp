@@ -159,7 +159,7 @@ teleop::ArmReference ArmLoop::step_controller(TimePoint t_robot, double dt_s) no
     controller_.engage(t_robot);
     engage_pending_ = false;
   }
-  const teleop::ArmReference reference = controller_.follow(t_robot, dt_s);
+  teleop::ArmReference reference = controller_.follow(t_robot, dt_s);
   reachable_ = reference.reachable;
   return reference;
 }

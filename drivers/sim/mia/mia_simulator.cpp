@@ -143,7 +143,7 @@ class MiaSimulator::Device {
   MiaDevice hand_;
 };
 
-MiaSimulator::MiaSimulator(MiaSimulatorConfig config) : device_(std::make_unique<Device>(config)) {}
+MiaSimulator::MiaSimulator(const MiaSimulatorConfig& config) : device_(std::make_unique<Device>(config)) {}
 
 MiaSimulator::~MiaSimulator() = default;
 

@@ -44,7 +44,7 @@ struct MiaSimulatorCounters {
 /// from one. As on the device, a position command is finished even if the host has gone.
 class MiaSimulator {
  public:
-  explicit MiaSimulator(MiaSimulatorConfig config);
+  explicit MiaSimulator(const MiaSimulatorConfig& config);
   ~MiaSimulator();  ///< stop()
   MiaSimulator(const MiaSimulator&) = delete;
   MiaSimulator& operator=(const MiaSimulator&) = delete;
