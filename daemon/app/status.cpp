@@ -5,6 +5,7 @@
 #include "daemon/app/heap_guard.hpp"
 #include "daemon/app/version.hpp"
 #include "drivers/transport/clock.hpp"
+#include "drivers/ur_rtde/status_text.hpp"
 
 namespace embody {
 namespace {
@@ -56,6 +57,15 @@ json latency_json(const TelemetrySnapshot& telemetry) {
   return stages;
 }
 
+/// What the arm's controller says about itself.
+json robot_json(const ArmState& arm) {
+  if (arm.package == 0) return json::object();
+  return {{"mode", rtde::robot_mode_text(arm.robot_mode)},
+          {"safety", rtde::safety_text(arm.safety_status)},
+          {"program", arm.program_fault == 0 ? "no fault" : rtde::program_fault_text(arm.program_fault)},
+          {"speed_scaling", arm.speed_scaling}};
+}
+
 json residual_json(const TelemetrySnapshot& telemetry) {
   json residual = json::object();
   for (std::size_t i = 0; i < kFingers; ++i) residual[kFingerNames[i]] = telemetry.residual_mean_m[i] * 1e3;
@@ -82,6 +92,7 @@ std::string Daemon::status_json() {
                     {"uptime_s", to_seconds(transport::now() - t_start_)},
                     {"mode", mode_json(mode_now)},
                     {"devices", devices_json(links_->reports())},
+                    {"robot", robot_json(telemetry.arm)},
                     {"rates_hz",
                      {{"tracker", telemetry.tracker_hz},
                       {"arm", telemetry.arm_hz},

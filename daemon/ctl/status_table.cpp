@@ -158,6 +158,7 @@ std::string status_table(const std::string& json_text) {
   table.line("embodyd", head);
   add_mode(table, member(status, "mode"));
   add_devices(table, member(status, "devices"));
+  table.pairs("robot", member(status, "robot"), "");
   table.pairs("rates", member(status, "rates_hz"), " Hz");
   table.pairs("residuals", member(status, "marker_residual_mm"), " mm");
   table.pairs("tracking", member(status, "tracking"), "");
@@ -166,8 +167,8 @@ std::string status_table(const std::string& json_text) {
   table.pairs("counters", member(status, "counters"), "");
 
   static const std::set<std::string> kKnown{
-      "version",  "uptime_s",           "mode",    "devices", "rates_hz", "counters", "latency_us",
-      "realtime", "marker_residual_mm", "tracking"};
+      "version",  "uptime_s",           "mode",     "devices", "rates_hz", "counters", "latency_us",
+      "realtime", "marker_residual_mm", "tracking", "robot"};
   json others = json::object();
   for (const auto& [key, value] : status.items()) {
     if (kKnown.count(key) == 0) others[key] = value;

@@ -68,6 +68,7 @@ void ArmLoop::lose_arm() noexcept {
   reachable_ = false;
   controller_.halt();
   report_.state = {};
+  edges_.arm_to_telemetry.publish(report_);
   last_controller_time_ = Duration{0};
   step_modes(now());
 }

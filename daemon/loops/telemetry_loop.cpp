@@ -122,7 +122,7 @@ void TelemetryLoop::log_mode() {
 }
 
 void TelemetryLoop::publish(TimePoint now) {
-  if (new_arm_) publish_joint_states();
+  if (new_arm_ && data_.arm.package > 0) publish_joint_states();
   if (new_pose_) {
     const HandPose& pose = edges_.pose_to_telemetry.get();
     if (pose.valid) publisher_.publish_hand_pose(pose.X_WM, "mocap", to_wall_time(pose.t_capture));
