@@ -10,7 +10,12 @@
 namespace embody {
 namespace {
 
+#ifdef EMBODY_SANITIZED
+constexpr std::size_t kStackSize = std::size_t{8} * 1024 * 1024;  // sanitizers keep their own state there
+#else
 constexpr std::size_t kStackSize = std::size_t{512} * 1024;
+#endif
+constexpr std::size_t kPrefaulted = std::size_t{128} * 1024;
 
 struct Attributes {
   pthread_attr_t value{};
@@ -30,7 +35,7 @@ struct Attributes {
 
 /// Touches the stack once, so that no page fault comes later.
 void prefault_stack() noexcept {
-  volatile char page_toucher[kStackSize / 4];
+  volatile char page_toucher[kPrefaulted];
   for (std::size_t i = 0; i < sizeof page_toucher; i += 4096) page_toucher[i] = 0;
 }
 
