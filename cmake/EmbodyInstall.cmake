@@ -31,6 +31,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/systemd/70-embody-mia.rules DESTINATION lib/
 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/systemd/lab-network.conf
         DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/embody)
+install(PROGRAMS ${PROJECT_SOURCE_DIR}/scripts/mano-pickle-to-npz DESTINATION ${embody_share}/scripts)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples/dds_subscriber DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/embody/examples)
 install(FILES ${PROJECT_SOURCE_DIR}/docs/man/embodyctl.1 ${PROJECT_SOURCE_DIR}/docs/man/embody-sim.1
         DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)

@@ -160,6 +160,15 @@ void EmbodimentMapping::step(const HandState& state, FingerTarget& target) noexc
   target.joint_count = motors_.size();
   target.residual_m.fill(0.0);
   target.valid = state.valid;
+  target.joint_confidence.fill(1.0);  // of a motor that follows no finger
+  std::array<bool, kMaxHandJoints> follows{};
+  for (std::size_t finger = 0; finger < kFingers; ++finger) {
+    const std::size_t motor = circles_[finger][0].motor;
+    if (motor == kNoIndex) continue;
+    double& confidence = target.joint_confidence[motor];
+    confidence =
+        std::exchange(follows[motor], true) ? std::min(confidence, state.confidence[finger]) : state.confidence[finger];
+  }
   // Per motor: cost = const - 2 (U cos(k r) + V sin(k r)), summed over the points that the motor moves.
   std::array<double, kMaxHandJoints> U{}, V{};
   std::array<std::array<Eigen::Vector3d, 2>, kFingers> p_P;

@@ -32,8 +32,9 @@ class EmbodimentMapping {
   /// motor-driven joint, or a motor whose couplings differ in ratio).
   [[nodiscard]] static Result<EmbodimentMapping> create(const robot::RobotModel& model, const EmbodimentConfig& config);
 
-  /// One mapping. Copies frame number and times (t_solved is the caller's: core has no clock). The target is invalid
-  /// when the state is invalid or not finite; it then repeats the last valid angles.
+  /// One mapping. Copies frame number and times (t_solved and hand_confidence are the caller's). The target is invalid
+  /// when the state is invalid or not finite; it then repeats the last valid angles. A joint is as sure as the least
+  /// sure finger that it follows.
   void step(const HandState& state, FingerTarget& target) noexcept;
 
   [[nodiscard]] const Pose& X_PM() const noexcept { return X_PM_; }

@@ -27,13 +27,17 @@ inline constexpr std::array<const char*, kFingers> kFingerNames{"thumb", "index"
 /// First element of each finger in MANO's 45 finger angles (order index, middle, little, ring, thumb).
 inline constexpr std::array<std::size_t, kFingers> kFingerOffset{36, 0, 9, 27, 18};
 
+/// Which hand of the person.
+enum class Side : std::uint8_t { kRight, kLeft };
+
 struct Marker {
   Eigen::Vector3d p_W{0.0, 0.0, 0.0};  ///< m; meaningless unless visible
   bool visible{false};
+  float confidence{1.0F};  ///< 0..1 for sensors that tell how sure they are
 };
 
 /// One measurement of the tracker. `markers[i]` is the i-th name of the configured glove layout, whatever the sensor's
-/// order.
+/// order; a landmark tracker fills the 21 slots of core/hand/landmark_layout.hpp.
 struct MarkerFrame {
   std::uint64_t frame_number{0};  ///< the sensor's own count; may restart
   std::uint32_t label_epoch{0};   ///< changes when the sensor's label list changed
@@ -54,6 +58,7 @@ struct HandPose {
   Pose X_WH{Pose::Identity()};  ///< frame of the three markers on the back of the hand
   Pose X_WM{Pose::Identity()};  ///< base of the hand model
   bool valid{false};            ///< false: the poses are the last valid ones
+  double fit_error_m{0.0};      ///< how far the back of the hand is from its known shape, root mean square
   std::uint32_t streak{0};      ///< valid, plausible poses in a row up to this one, without a gap in time
   std::uint32_t jumps{0};       ///< times that a sudden but lasting change of pose was accepted
 };
@@ -62,7 +67,9 @@ enum class FingerQuality : std::uint8_t {
   kNone,     ///< no estimate yet
   kOptimal,  ///< converged on this frame's markers
   kCapped,   ///< iteration cap reached; best point so far
-  kHeld,     ///< no marker of this finger visible; angles of an earlier frame
+  kHeld,     ///< no usable marker of this finger; angles of an earlier frame
+  kAtLimit,  ///< converged, with an angle pressed against its bound
+  kLost,     ///< held for too long: the angles decay towards the resting hand
 };
 
 [[nodiscard]] inline std::array<std::array<Eigen::Vector3d, 2>, kFingers> zero_points() noexcept {
@@ -85,6 +92,8 @@ struct HandState {
   std::array<double, kFingers> residual_m{};  ///< mean distance of visible markers to their model points
   std::array<std::uint8_t, kFingers> visible_markers{};
   std::array<FingerQuality, kFingers> quality{};
+  std::array<double, kFingers> confidence{};  ///< 0 (nothing known) .. 1 (all markers seen and explained)
+  double hand_confidence{0.0};                ///< the least of back of the hand and fingers that are measured
   bool valid{false};
 };
 
@@ -97,6 +106,9 @@ struct FingerTarget {
   std::size_t joint_count{0};
   std::array<double, kMaxHandJoints> q_rad{};
   std::array<double, kFingers> residual_m{};  ///< root mean square distance of the finger's point pairs
+  /// 0..1, by joint: the least confidence of the human fingers that the joint follows.
+  std::array<double, kMaxHandJoints> joint_confidence{};
+  double hand_confidence{0.0};  ///< 0..1, in the pose of the back of the human hand
   bool valid{false};
 };
 

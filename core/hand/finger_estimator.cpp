@@ -1,133 +1,268 @@
 #include "core/hand/finger_estimator.hpp"
 
 #include <algorithm>
-
-#include "core/math/bounded_least_squares.hpp"
+#include <cmath>
 
 namespace embody::hand {
 namespace {
 
+using Eigen::Index;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr Duration kUsualStep = std::chrono::milliseconds(10);
+constexpr int kReferenceEvaluations = 2000;
+constexpr double kReferenceTolerance = 1e-14;
+constexpr Duration kLongestStep = std::chrono::milliseconds(100);
 
-Vector9 weights(double x1, double y1, double z1, double x2, double y2, double z2, double x3, double y3, double z3) {
+Vector9 angles(double x1, double y1, double z1, double x2, double y2, double z2, double x3, double y3, double z3) {
   Vector9 w;
   w << x1, y1, z1, x2, y2, z2, x3, y3, z3;
   return w;
 }
 
+/// The same ranges and weights for a left hand, whose rotations about y and z have the other sign.
+void mirror(FingerEstimatorConfig& config) noexcept {
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    for (Index i = 0; i < 9; ++i) {
+      if (i % 3 == 0) continue;
+      const double lower = config.lower_rad[f](i);
+      config.lower_rad[f](i) = -config.upper_rad[f](i);
+      config.upper_rad[f](i) = -lower;
+      std::swap(config.weight_plus[f](i), config.weight_minus[f](i));
+    }
+  }
+}
+
 }  // namespace
 
+FingerEstimatorConfig FingerEstimatorConfig::published() noexcept {
+  FingerEstimatorConfig config;
+  config.lower_rad.fill(Vector9::Constant(-0.4 * kPi));
+  config.upper_rad.fill(Vector9::Constant(0.4 * kPi));
+  const Vector9 thumb = angles(.01, .01, .01, .01, .01, .01, .01, .05, .05);
+  const Vector9 plus = angles(.1, .001, .001, .1, .01, .001, .1, .01, .001);
+  const Vector9 minus = angles(.1, .001, .001, .1, .05, .005, .1, .05, .005);
+  config.weight_plus = {thumb, angles(.1, .001, .001, .1, .05, .001, .1, .05, .001), plus, plus, plus};
+  config.weight_minus = {thumb, angles(.1, .001, .001, .1, .05, .5, .1, .05, .05), minus, minus, minus};
+  config.temporal_m_rad.fill(Vector9::Zero());
+  config.coupling_m_rad = 0.0;
+  return config;
+}
+
 FingerEstimatorConfig::FingerEstimatorConfig() noexcept {
-  lower_rad.fill(Vector9::Constant(-0.4 * kPi));
-  upper_rad.fill(Vector9::Constant(0.4 * kPi));
-  const Vector9 thumb = weights(.01, .01, .01, .01, .01, .01, .01, .05, .05);
-  const Vector9 plus = weights(.1, .001, .001, .1, .01, .001, .1, .01, .001);
-  const Vector9 minus = weights(.1, .001, .001, .1, .05, .005, .1, .05, .005);
-  weight_plus = {thumb, weights(.1, .001, .001, .1, .05, .001, .1, .05, .001), plus, plus, plus};
-  weight_minus = {thumb, weights(.1, .001, .001, .1, .05, .5, .1, .05, .05), minus, minus, minus};
+  // Active ranges of the joints plus some tolerance for what the model does not know (twist, frames that are a few
+  // degrees off): knuckles -29..100 degrees flexion, +-34 spread; middle joints -6..115; end joints -9..92.
+  lower_rad.fill(angles(-.3, -.6, -.5, -.15, -.15, -.1, -.15, -.15, -.15));
+  upper_rad.fill(angles(.3, .6, 1.75, .15, .15, 2.0, .15, .15, 1.6));
+  weight_plus.fill(angles(.05, .002, .001, .1, .05, .001, .1, .05, .001));
+  weight_minus = weight_plus;
+  // The thumb's joints do not turn about M's axes: wide bounds, even weights (Fabisch et al. 2022).
+  lower_rad[0].setConstant(-0.4 * kPi);
+  upper_rad[0].setConstant(0.4 * kPi);
+  weight_plus[0] = weight_minus[0] = angles(.01, .01, .01, .01, .01, .01, .01, .05, .05);
+  temporal_m_rad.fill(Vector9::Constant(.005));
+  coupling_m_rad = .01;
 }
 
 FingerEstimator::FingerEstimator(const HandModel& model, const GloveLayout& glove,
                                  const FingerEstimatorConfig& config) noexcept
-    : model_(model), config_(config) {
-  for (auto& slots : slots_) slots.fill(kMaxMarkers);
-  for (const FingerMarker& marker : glove.finger_markers) {
-    if (marker.point != 0 && marker.point != 1) continue;
-    slots_[static_cast<std::size_t>(marker.finger)][static_cast<std::size_t>(marker.point)] = marker.slot;
-  }
+    : model_(model), glove_(glove), config_(config), guard_(model, glove, config.guard) {
+  if (model_.side() == Side::kLeft) mirror(config_);
   for (std::size_t f = 0; f < kFingers; ++f) {
-    q_rad_[f] = Vector9::Zero().cwiseMax(config_.lower_rad[f]).cwiseMin(config_.upper_rad[f]);
+    FingerProblem& problem = problems_[f];
+    problem.finger = static_cast<Finger>(f);
+    problem.objective = config_.objective;
+    problem.weight_plus = config_.weight_plus[f];
+    problem.weight_minus = config_.weight_minus[f];
+    problem.coupling_m_rad = f == 0 ? 0.0 : config_.coupling_m_rad;  // the thumb's last two joints are not coupled
+    problem.coupling_ratio = config_.coupling_ratio;
+    memory_[f].q_rad = Vector9::Zero().cwiseMax(config_.lower_rad[f]).cwiseMin(config_.upper_rad[f]);
   }
+  for (const FingerMarker& marker : glove_.finger_markers) ++carried_[static_cast<std::size_t>(marker.finger)];
 }
 
 void FingerEstimator::step(const MarkerFrame& frame, const HandPose& hand_pose, HandState& state) noexcept {
+  const Duration dt = step_time(frame.t_capture);
   state.frame_number = frame.frame_number;
   state.t_capture = frame.t_capture;
   state.t_arrival = frame.t_arrival;
   state.X_WM = hand_pose.X_WM;
   state.valid = hand_pose.valid;
-  const Pose X_MW = hand_pose.X_WM.inverse();
+  if (config_.trust_labels) {
+    trust(frame, hand_pose);
+  } else {
+    guard_.step(frame, hand_pose, checked_);
+  }
+  gather(frame);
   for (std::size_t f = 0; f < kFingers; ++f) {
-    std::array<const Marker*, 2> markers{};
-    std::uint8_t visible = 0;
-    for (std::size_t point = 0; point < 2; ++point) {
-      const std::size_t slot = slots_[f][point];
-      if (slot >= kMaxMarkers || slot >= frame.count) continue;
-      const Marker& marker = frame.markers[slot];
-      if (!marker.visible || !marker.p_W.allFinite()) continue;
-      markers[point] = &marker;
-      ++visible;
-    }
-    state.visible_markers[f] = visible;
-    if (hand_pose.valid && visible > 0) {
-      solve(f, markers, X_MW, state);
+    FingerProblem& problem = problems_[f];
+    if (!hand_pose.valid) problem.markers.clear();
+    state.visible_markers[f] = static_cast<std::uint8_t>(problem.markers.size());
+    if (problem.markers.empty()) {
+      hold(f, dt, state);
     } else {
-      hold(f, state);
+      prepare(f, dt);
+      solve(f, state);
+      if (state.quality[f] == FingerQuality::kHeld) hold(f, dt, state);
     }
+  }
+  if (hand_pose.valid) explain();
+  rate(hand_pose, state);
+}
+
+/// Time since the last frame, kept within reason: clocks may stand or jump.
+Duration FingerEstimator::step_time(TimePoint t_capture) noexcept {
+  const Duration dt = t_last_ == TimePoint{} ? kUsualStep : t_capture - t_last_;
+  t_last_ = t_capture;
+  return dt <= Duration{0} ? kUsualStep : std::min(dt, kLongestStep);
+}
+
+/// Every visible marker is what its label says.
+void FingerEstimator::trust(const MarkerFrame& frame, const HandPose& hand_pose) noexcept {
+  const Pose X_MW = hand_pose.X_WM.inverse();
+  checked_.residual_m.fill(0.0);
+  for (const FingerMarker& marker : glove_.finger_markers) {
+    if (marker.slot >= kMaxMarkers) continue;
+    const Marker& seen = frame.markers[marker.slot];
+    const bool used = hand_pose.valid && marker.slot < frame.count && seen.visible && seen.p_W.allFinite();
+    checked_.verdict[marker.slot] = used ? MarkerVerdict::kUsed : MarkerVerdict::kMissing;
+    checked_.source[marker.slot] = static_cast<std::uint8_t>(marker.slot);
+    if (used) checked_.p_M[marker.slot] = X_MW * seen.p_W;
   }
 }
 
-void FingerEstimator::solve(std::size_t finger, const std::array<const Marker*, 2>& markers, const Pose& X_MW,
-                            HandState& state) noexcept {
-  const auto id = static_cast<Finger>(finger);
-  std::array<Vector3d, 2> p_M_measured{};
-  std::size_t observed_joints = 0;
-  for (std::size_t point = 0; point < 2; ++point) {
-    if (markers[point] == nullptr) continue;
-    p_M_measured[point] = X_MW * markers[point]->p_W;
-    observed_joints = std::max(observed_joints, model_.joints_moving(id, point));
+/// The usable markers of each finger.
+void FingerEstimator::gather(const MarkerFrame& frame) noexcept {
+  for (FingerProblem& problem : problems_) problem.markers.clear();
+  for (FingerMemory& memory : memory_) memory.seen_now = 0;
+  for (const FingerMarker& marker : glove_.finger_markers) {
+    if (marker.slot >= kMaxMarkers || marker.point >= model_.point_count(marker.finger)) continue;
+    if (!checked_.usable(marker.slot)) continue;
+    const double weight = frame.markers[checked_.source[marker.slot]].confidence;
+    if (!(weight > 0.0)) continue;
+    const auto f = static_cast<std::size_t>(marker.finger);
+    problems_[f].markers.push_back({marker.point, checked_.p_M[marker.slot], weight});
+    const std::uint64_t measurement = kMaxMarkers * marker.point + checked_.source[marker.slot];
+    memory_[f].seen_now = (kMaxMarkers * kMaxFingerPoints + 1) * memory_[f].seen_now + measurement + 1;
   }
-  // Residuals: three per marker (zero where it is not visible), then one per angle.
-  const auto evaluate = [&](const Vector9& q, math::LeastSquaresModel<9, 15>& at) noexcept {
-    const FingerKinematics kinematics = model_.finger_kinematics(id, q);
-    at.r.setZero();
-    at.J.setZero();
-    for (std::size_t point = 0; point < 2; ++point) {
-      if (markers[point] == nullptr) continue;
-      const auto row = 3 * static_cast<Eigen::Index>(point);
-      const Vector3d error = kinematics.p_M[point] - p_M_measured[point];
-      at.r.segment<3>(row) = error;
-      at.J.middleRows<3>(row) = kinematics.J[point];
-      add_curvature(kinematics, point, error, at.curvature);
-    }
-    for (Eigen::Index i = 0; i < 9; ++i) {
-      const double w = q(i) >= 0.0 ? config_.weight_plus[finger](i) : config_.weight_minus[finger](i);
-      at.r(6 + i) = w * q(i);
-      at.J(6 + i, i) = w;
-    }
-  };
-  // An angle that no visible marker depends on keeps its value instead of falling back to zero.
-  Vector9 lower = config_.lower_rad[finger];
-  Vector9 upper = config_.upper_rad[finger];
-  for (Eigen::Index i = 3 * static_cast<Eigen::Index>(observed_joints); i < 9; ++i) {
-    lower(i) = upper(i) = q_rad_[finger](i);
+}
+
+/// Range, start and prior of one finger's problem. Angles that no marker depends on keep their value. After a marker
+/// came or went, the angles may only move so fast until the new optimum lies within one step: no jump.
+void FingerEstimator::prepare(std::size_t finger, Duration dt) noexcept {
+  FingerProblem& problem = problems_[finger];
+  FingerMemory& memory = memory_[finger];
+  problem.model = &model_;  // here: copies of this object hold their own model
+  std::size_t moved = 0;
+  for (const FingerMeasurement& marker : problem.markers) {
+    moved = std::max(moved, model_.joints_moving(problem.finger, marker.point));
   }
-  const auto solution = math::solve_bounded_least_squares<9, 15>(evaluate, q_rad_[finger], lower, upper,
-                                                                 {config_.max_iterations, config_.tolerance});
+  memory.catching_up = memory.known && (memory.catching_up || memory.seen_now != memory.seen);
+  memory.seen = memory.seen_now;
+  const Vector9& q = memory.q_rad;
+  problem.lower_rad = config_.lower_rad[finger];
+  problem.upper_rad = config_.upper_rad[finger];
+  const auto n = 3 * static_cast<Index>(moved);
+  problem.lower_rad.tail(9 - n) = problem.upper_rad.tail(9 - n) = q.tail(9 - n);
+  if (memory.catching_up) {
+    const double reach =
+        config_.catch_up_rad_s * to_seconds(dt) / std::sqrt(3.0);  // per component of a rotation vector
+    problem.lower_rad = problem.lower_rad.cwiseMax((q.array() - reach).matrix()).cwiseMin(q);
+    problem.upper_rad = problem.upper_rad.cwiseMin((q.array() + reach).matrix()).cwiseMax(q);
+  }
+  problem.q_previous_rad = q;
+  problem.start_rad = q;
+  const double per_step =
+      std::sqrt(to_seconds(kUsualStep) / to_seconds(dt));  // a random walk: variance grows with time
+  problem.temporal_m_rad = memory.known ? Vector9(per_step * config_.temporal_m_rad[finger]) : Vector9::Zero();
+}
+
+void FingerEstimator::solve(std::size_t finger, HandState& state) noexcept {
+  const FingerProblem& problem = problems_[finger];
+  FingerMemory& memory = memory_[finger];
+  const FingerSolution solution = config_.solver == FingerSolver::kOwn
+                                      ? solve_own(problem, config_.max_iterations, config_.tolerance)
+                                      : solve_slsqp(problem, kReferenceEvaluations, kReferenceTolerance);
   iterations_[finger] = solution.iterations;
-  if (solution.status == math::LeastSquaresStatus::kInvalid) return hold(finger, state);
-  q_rad_[finger] = solution.x;
-  known_[finger] = true;
-  const std::array<Vector3d, 2> p_M = model_.finger_points(id, solution.x);
-  double distance_m = 0.0;
-  for (std::size_t point = 0; point < 2; ++point) {
-    if (markers[point] != nullptr) distance_m += (p_M[point] - p_M_measured[point]).norm();
+  state.quality[finger] = FingerQuality::kHeld;
+  if (solution.status == SolveStatus::kInvalid) return;
+  if (memory.catching_up) {
+    const auto free = [](double limit, double range) { return std::abs(limit - range) > 1e-12; };
+    bool limited = false;
+    for (Index i = 0; i < 9; ++i) {
+      if (!(problem.lower_rad(i) < problem.upper_rad(i))) continue;
+      limited |= solution.q_rad(i) <= problem.lower_rad(i) && free(problem.lower_rad(i), config_.lower_rad[finger](i));
+      limited |= solution.q_rad(i) >= problem.upper_rad(i) && free(problem.upper_rad(i), config_.upper_rad[finger](i));
+    }
+    memory.catching_up = limited;
   }
-  residual_m_[finger] = distance_m / state.visible_markers[finger];
-  state.q_rad.segment<9>(static_cast<Eigen::Index>(kFingerOffset[finger])) = solution.x;
-  state.p_M[finger] = p_M;
-  state.residual_m[finger] = residual_m_[finger];
-  state.quality[finger] = solution.converged() ? FingerQuality::kOptimal : FingerQuality::kCapped;
+  memory.q_rad = solution.q_rad;
+  memory.known = true;
+  memory.unseen = Duration{0};
+  const FingerChain chain = model_.chain(problem.finger, solution.q_rad);
+  double distance_m = 0.0;
+  for (const FingerMeasurement& marker : problem.markers) {
+    distance_m += (model_.point(problem.finger, marker.point, chain) - marker.p_M).norm();
+  }
+  memory.residual_m = distance_m / static_cast<double>(problem.markers.size());
+  state.q_rad.segment<9>(static_cast<Index>(kFingerOffset[finger])) = solution.q_rad;
+  state.p_M[finger] = {model_.point(problem.finger, 0, chain), model_.point(problem.finger, 1, chain)};
+  state.residual_m[finger] = memory.residual_m;
+  state.quality[finger] = solution.status == SolveStatus::kCapped    ? FingerQuality::kCapped
+                          : solution.status == SolveStatus::kAtLimit ? FingerQuality::kAtLimit
+                                                                     : FingerQuality::kOptimal;
 }
 
-void FingerEstimator::hold(std::size_t finger, HandState& state) noexcept {
+/// Tells the guard where the model has each marker now, and answers its question.
+void FingerEstimator::explain() noexcept {
+  std::array<FingerChain, kFingers> chains;
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    if (carried_[f] > 0) chains[f] = model_.chain(static_cast<Finger>(f), memory_[f].q_rad);
+  }
+  for (const FingerMarker& marker : glove_.finger_markers) {
+    if (marker.slot >= kMaxMarkers || marker.point >= model_.point_count(marker.finger)) continue;
+    const Vector3d model_M = model_.point(marker.finger, marker.point, chains[static_cast<std::size_t>(marker.finger)]);
+    if (!config_.trust_labels) {
+      guard_.explain(marker.slot, model_M, checked_);
+    } else if (checked_.usable(marker.slot)) {
+      checked_.residual_m[marker.slot] = (model_M - checked_.p_M[marker.slot]).norm();
+    }
+  }
+  if (config_.trust_labels || !guard_.trial()) return;
+  const MarkerTrial trial = *guard_.trial();
+  FingerProblem problem = problems_[static_cast<std::size_t>(trial.finger)];
+  problem.model = &model_;
+  problem.lower_rad = config_.lower_rad[static_cast<std::size_t>(trial.finger)];
+  problem.upper_rad = config_.upper_rad[static_cast<std::size_t>(trial.finger)];
+  problem.start_rad = memory_[static_cast<std::size_t>(trial.finger)].q_rad;
+  guard_.answer(posture_residual_m(problem, trial, config_.max_iterations, config_.tolerance));
+}
+
+void FingerEstimator::rate(const HandPose& hand_pose, HandState& state) const noexcept {
+  std::array<bool, kFingers> carries{};
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    carries[f] = carried_[f] > 0;
+    state.confidence[f] = finger_confidence(
+        {carried_[f], state.visible_markers[f], memory_[f].unseen, memory_[f].residual_m, state.quality[f]},
+        config_.confidence);
+  }
+  state.hand_confidence =
+      hand_confidence(hand_pose.valid, hand_pose.fit_error_m, state.confidence, carries, config_.confidence);
+}
+
+void FingerEstimator::hold(std::size_t finger, Duration dt, HandState& state) noexcept {
+  FingerMemory& memory = memory_[finger];
   iterations_[finger] = 0;
-  state.q_rad.segment<9>(static_cast<Eigen::Index>(kFingerOffset[finger])) = q_rad_[finger];
-  state.p_M[finger] = model_.finger_points(static_cast<Finger>(finger), q_rad_[finger]);
-  state.residual_m[finger] = residual_m_[finger];
-  state.quality[finger] = known_[finger] ? FingerQuality::kHeld : FingerQuality::kNone;
+  memory.seen = 0;
+  memory.unseen = std::min(memory.unseen + dt, Duration{std::chrono::hours(1)});
+  const bool lost = memory.unseen > config_.hold;
+  if (lost) memory.q_rad *= std::exp(-to_seconds(dt) / to_seconds(config_.decay));
+  memory.q_rad = memory.q_rad.cwiseMax(config_.lower_rad[finger]).cwiseMin(config_.upper_rad[finger]);
+  state.q_rad.segment<9>(static_cast<Index>(kFingerOffset[finger])) = memory.q_rad;
+  state.p_M[finger] = model_.finger_points(static_cast<Finger>(finger), memory.q_rad);
+  state.residual_m[finger] = memory.residual_m;
+  state.quality[finger] = !memory.known ? FingerQuality::kNone : lost ? FingerQuality::kLost : FingerQuality::kHeld;
 }
 
 }  // namespace embody::hand

@@ -9,7 +9,7 @@ GloveLayout paper_glove() noexcept {
   GloveLayout glove;
   for (const char* name : kNames) glove.names.push_back(name);
   for (std::size_t i = 0; i < 2 * kFingers; ++i) {
-    glove.finger_markers.push_back({static_cast<Finger>(i / 2), static_cast<int>(i % 2), 3 + i});
+    glove.finger_markers.push_back({static_cast<Finger>(i / 2), i % 2, 3 + i});
   }
   return glove;
 }

@@ -12,13 +12,15 @@ namespace embody::hand {
 /// A marker on a finger and the model point that it corresponds to.
 struct FingerMarker {
   Finger finger{Finger::kThumb};
-  int point{0};         ///< 0 tip, 1 middle: second index of HandState::p_M
-  std::size_t slot{0};  ///< index into MarkerFrame::markers
+  std::size_t point{0};  ///< index into the finger's HandPoints: 0 tip, 1 middle, further ones of the glove's own
+  std::size_t slot{0};   ///< index into MarkerFrame::markers
 };
 
 struct GloveLayout {
   StaticVector<FixedString<48>, kMaxMarkers> names;  ///< the sensor's label of each slot
   std::array<std::size_t, 3> back_slots{0, 1, 2};    ///< top, left, right marker on the back of the hand
+  /// Distances top-left, top-right, left-right of those three, m; zeros: not known, learnt from the first good frames.
+  std::array<double, 3> back_edges_m{};
   StaticVector<FingerMarker, 32> finger_markers;
 };
 

@@ -1,140 +1,225 @@
 #include "core/hand/hand_model.hpp"
 
-#include <algorithm>
-
 #include "core/math/so3_jacobian.hpp"
 
 namespace embody::hand {
 namespace {
 
+using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Wrist (root joint) in M: MANO's origin lies near the knuckle of the middle finger. With this offset, calibrated
-// transforms X_HM and X_PM made for MANO hold for this model.
-Vector3d wrist_joint() noexcept {
-  return {0.0957, 0.0064, 0.0062};
+Index idx(std::size_t i) noexcept {
+  return static_cast<Index>(i);
 }
 
-// First, second, third joint and fleshy tip of each finger (by Finger) in the flat hand, from the wrist, m.
-using FingerPoints = std::array<std::array<Vector3d, 4>, kFingers>;
-
-FingerPoints skeleton_points(Skeleton skeleton) noexcept {
-  if (skeleton == Skeleton::kWebXr) {
-    return {
-        {{{{-.0360, -.0192, .0280}, {-.0592, -.0343, .0450}, {-.0831, -.0437, .0669}, {-.0974, -.0524, .0852}}},
-         {{{-.0885, -.0073, .0236}, {-.1338, -.0106, .0220}, {-.1579, -.0128, .0207}, {-.1804, -.0116, .0182}}},
-         {{{-.0916, -.0025, .0017}, {-.1381, -.0070, -.0026}, {-.1654, -.0098, -.0057}, {-.1899, -.0077, -.0090}}},
-         {{{-.0847, -.0065, -.0175}, {-.1263, -.0109, -.0268}, {-.1519, -.0142, -.0332}, {-.1749, -.0157, -.0378}}},
-         {{{-.0739, -.0137, -.0351}, {-.1074, -.0181, -.0424}, {-.1264, -.0210, -.0490}, {-.1472, -.0224, -.0543}}}}};
+/// Row-major R - I of the finger's three joints: what pose correctives multiply.
+Eigen::Matrix<double, 27, 1> corrective_features(const FingerChain& chain) noexcept {
+  Eigen::Matrix<double, 27, 1> features;
+  for (std::size_t level = 0; level < 3; ++level) {
+    const Matrix3d R = chain.R_M_parent[level].transpose() * chain.R_MJ[level];
+    for (Index row = 0; row < 3; ++row) {
+      for (Index col = 0; col < 3; ++col)
+        features(9 * idx(level) + 3 * row + col) = R(row, col) - (row == col ? 1.0 : 0.0);
+    }
   }
-  return {{{{{-.0200, -.0120, .0250}, {-.0523, -.0268, .0546}, {-.0776, -.0344, .0719}, {-.1006, -.0398, .0856}}},
-           {{{-.0955, -.0035, .0225}, {-.1353, -.0035, .0225}, {-.1577, -.0035, .0225}, {-.1773, -.0035, .0225}}},
-           {{{-.0985, .0, .0015}, {-.1431, .0, -.0008}, {-.1694, .0, -.0022}, {-.1907, .0, -.0033}}},
-           {{{-.0915, -.0030, -.0185}, {-.1325, -.0030, -.0243}, {-.1579, -.0030, -.0278}, {-.1789, -.0030, -.0308}}},
-           {{{-.0800, -.0090, -.0360}, {-.1118, -.0090, -.0439}, {-.1293, -.0090, -.0483}, {-.1484, -.0090, -.0531}}}}};
-}
-
-double factor(const HandModelConfig& config, HandShape parameter) noexcept {
-  return 1.0 + config.shape(static_cast<Eigen::Index>(parameter));
-}
-
-HandShape length_of(std::size_t finger) noexcept {
-  return static_cast<HandShape>(static_cast<std::size_t>(HandShape::kThumbLength) + finger);
+  return features;
 }
 
 }  // namespace
 
-HandModel::HandModel(const HandModelConfig& config) noexcept {
-  const FingerPoints reference = skeleton_points(config.skeleton);
-  const double scale = factor(config, HandShape::kScale);
-  const double girth = factor(config, HandShape::kGirth);
-  const Vector3d palm(factor(config, HandShape::kPalmLength), girth, factor(config, HandShape::kPalmBreadth));
-  joints_[0] = wrist_joint();
+HandModel::HandModel()
+    : HandModel(builtin_hand(Skeleton::kBoneLengths, Side::kRight), Shape::Zero(),
+                default_points(builtin_hand(Skeleton::kBoneLengths, Side::kRight))) {}
+
+HandModel::HandModel(const HandData& data, const Shape& shape, const HandPoints& points) : side_(data.side) {
+  for (std::size_t k = 0; k < kHandModelJoints; ++k) {
+    joints_[k] = data.joints_M.col(idx(k)) + data.joint_directions.middleRows<3>(3 * idx(k)) * shape;
+  }
   for (std::size_t f = 0; f < kFingers; ++f) {
-    const std::size_t first = first_joint(static_cast<Finger>(f));
-    const double length = factor(config, length_of(f));
-    const std::array<double, 3> stretch{length, length, length * factor(config, HandShape::kDistalLength)};
-    joints_[first] = joints_[0] + scale * reference[f][0].cwiseProduct(palm);
-    for (std::size_t level = 0; level < 3; ++level) {
-      const Vector3d end =
-          joints_[first + level] + scale * stretch[level] * (reference[f][level + 1] - reference[f][level]);
-      (level < 2 ? joints_[first + level + 1] : tips_[f]) = end;
+    tips_[f] = data.tips_M.col(idx(f)) + data.tip_directions.middleRows<3>(3 * idx(f)) * shape;
+  }
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    for (const HandPoint& point : points[f]) points_[f].push_back(make_point(data, shape, f, point));
+  }
+}
+
+HandModel::Point HandModel::make_point(const HandData& data, const Shape& shape, std::size_t finger,
+                                       const HandPoint& given) const {
+  const std::size_t first = first_joint(static_cast<Finger>(finger));
+  Point point;
+  point.correctives.setZero();
+  const std::size_t level = given.joint - first;
+  switch (given.kind) {
+    case HandPoint::Kind::kBone: {
+      Vector3d p_J = given.offset_m;
+      if (given.stretches) {
+        const Vector3d end =
+            level == 2 ? Vector3d(data.tips_M.col(idx(finger))) : Vector3d(data.joints_M.col(idx(given.joint + 1)));
+        const Vector3d bone = end - data.joints_M.col(idx(given.joint));
+        const Vector3d shaped = (level == 2 ? tips_[finger] : joints_[given.joint + 1]) - joints_[given.joint];
+        const Vector3d along = p_J.dot(bone) / bone.squaredNorm() * bone;
+        const double thickness = 1.0 + data.thickness_directions.dot(shape);
+        p_J = shaped.norm() / bone.norm() * along + thickness * (p_J - along);
+      }
+      point.terms.push_back({static_cast<int>(level), 1.0, p_J});
+      break;
     }
-    for (std::size_t point = 0; point < 2; ++point) {
-      const MarkerAttachment& given = config.attachments[f][point];
-      const std::size_t level = std::clamp(given.joint, first, first + 2) - first;
-      const Vector3d bone = (reference[f][level + 1] - reference[f][level]).normalized();
-      const Vector3d p = given.p_rest_M - joints_[0] - reference[f][level];
-      const Vector3d along = p.dot(bone) * bone;
-      attachments_[f][point] = {level, scale * (stretch[level] * along + girth * (p - along))};
+    case HandPoint::Kind::kJoint: {
+      const Vector3d centre = joints_[given.joint];
+      if (level == 0) point.terms.push_back({-1, 1.0, centre});
+      if (level > 0) point.terms.push_back({static_cast<int>(level) - 1, 1.0, centre - joints_[given.joint - 1]});
+      break;
+    }
+    case HandPoint::Kind::kTip:
+      point.terms.push_back({2, 1.0, tips_[finger] - joints_[first + 2]});
+      break;
+    case HandPoint::Kind::kSurface: {
+      std::array<Term, 4> terms;  // palm and other fingers at rest, then the finger's joints
+      for (int l = 0; l < 4; ++l) terms[static_cast<std::size_t>(l)] = {l - 1, 0.0, Vector3d::Zero()};
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        const Index v = given.vertices[corner];
+        const double b = given.barycentric[corner];
+        if (b == 0.0) continue;
+        const Vector3d p =
+            data.mesh.vertices_M.col(v) + data.mesh.shape_directions.middleRows<3>(3 * v) * shape + given.offset_m;
+        for (std::size_t k = 0; k < kHandModelJoints; ++k) {
+          const bool own = k >= first && k <= first + 2;
+          Term& term = terms[own ? k - first + 1 : 0];
+          const double weight = b * data.mesh.weights(v, idx(k));
+          term.weight += weight;
+          term.p_J += weight * (own ? Vector3d(p - joints_[k]) : p);
+        }
+        if (data.mesh.pose_correctives.size() > 0) {
+          point.corrected = true;
+          point.correctives += b * data.mesh.pose_correctives.block<3, 27>(3 * v, 9 * (idx(first) - 1));
+        }
+      }
+      for (const Term& term : terms) {
+        if (term.weight != 0.0) point.terms.push_back(term);
+      }
+      break;
     }
   }
+  return point;
 }
 
 std::array<Pose, kHandModelJoints> HandModel::joint_poses(const Vector48& q_rad) const noexcept {
   std::array<Pose, kHandModelJoints> X_MJ;
   for (std::size_t k = 0; k < kHandModelJoints; ++k) {
-    const Pose X_PJ = math::pose_from(k == 0 ? joints_[0] : Vector3d(joints_[k] - joints_[k % 3 == 1 ? 0 : k - 1]),
-                                      q_rad.segment<3>(3 * static_cast<Eigen::Index>(k)));
-    X_MJ[k] = k == 0 ? X_PJ : X_MJ[k % 3 == 1 ? 0 : k - 1] * X_PJ;
+    const std::size_t parent = parent_joint(k);
+    const Pose X_PJ =
+        math::pose_from(k == 0 ? joints_[0] : Vector3d(joints_[k] - joints_[parent]), q_rad.segment<3>(3 * idx(k)));
+    X_MJ[k] = k == 0 ? X_PJ : X_MJ[parent] * X_PJ;
   }
   return X_MJ;
 }
 
-std::array<Vector3d, 2> HandModel::finger_points(Finger finger, const Vector9& q_rad) const noexcept {
-  return finger_kinematics(finger, q_rad).p_M;
+std::size_t HandModel::joints_moving(Finger finger, std::size_t point) const noexcept {
+  int level = -1;
+  for (const Term& term : at(finger, point).terms) level = std::max(level, term.level);
+  return static_cast<std::size_t>(level + 1);
 }
 
-FingerKinematics HandModel::finger_kinematics(Finger finger, const Vector9& q_rad) const noexcept {
+FingerChain HandModel::chain(Finger finger, const Vector9& q_rad) const noexcept {
   const std::size_t first = first_joint(finger);
-  FingerKinematics out;
+  FingerChain out;
   out.q_rad = q_rad;
   out.centres_M[0] = joints_[first];
   Matrix3d R = Matrix3d::Identity();  // of the parent; the wrist is at rest
-  std::array<Matrix3d, 3> R_MJ;
   for (std::size_t level = 0; level < 3; ++level) {
-    const Vector3d w = q_rad.segment<3>(3 * static_cast<Eigen::Index>(level));
+    const Vector3d w = q_rad.segment<3>(3 * idx(level));
     if (level > 0)
       out.centres_M[level] = out.centres_M[level - 1] + R * (joints_[first + level] - joints_[first + level - 1]);
     out.R_M_parent[level] = R;
-    out.axes_M.middleCols<3>(3 * static_cast<Eigen::Index>(level)) = R * math::left_jacobian_so3(w);
+    out.axes_M.middleCols<3>(3 * idx(level)) = R * math::left_jacobian_so3(w);
     R = R * math::exp_so3(w);
-    R_MJ[level] = R;
-  }
-  for (std::size_t point = 0; point < 2; ++point) {
-    const Attachment& attachment = attachments_[static_cast<std::size_t>(finger)][point];
-    out.level[point] = attachment.level;
-    out.p_M[point] = out.centres_M[attachment.level] + R_MJ[attachment.level] * attachment.p_J;
-    out.J[point].setZero();
-    for (std::size_t i = 0; i < 3 * (attachment.level + 1); ++i) {
-      const auto column = static_cast<Eigen::Index>(i);
-      out.J[point].col(column) = out.axes_M.col(column).cross(out.p_M[point] - out.centres_M[i / 3]);
-    }
+    out.R_MJ[level] = R;
   }
   return out;
 }
 
-void add_curvature(const FingerKinematics& kinematics, std::size_t point, const Vector3d& c,
-                   Matrix9& curvature) noexcept {
-  // With axes w_a, w_b of joints A <= B and lever u from joint B: d2p/da db = w_a x (w_b x u), plus (dw_a/db) x u when
-  // A = B.
-  const auto n = 3 * static_cast<Eigen::Index>(kinematics.level[point] + 1);
-  for (Eigen::Index a = 0; a < n; ++a) {
-    const Vector3d c_w = c.cross(kinematics.axes_M.col(a));
-    for (Eigen::Index b = a / 3 * 3; b < n; ++b) {
-      const double s = c_w.dot(kinematics.J[point].col(b));
-      curvature(a, b) += s;
-      if (b / 3 != a / 3) curvature(b, a) += s;
+Vector3d HandModel::point(Finger finger, std::size_t index, const FingerChain& chain) const noexcept {
+  const Point& point = at(finger, index);
+  Vector3d correction = Vector3d::Zero();
+  if (point.corrected) correction = point.correctives * corrective_features(chain);
+  Vector3d p = Vector3d::Zero();
+  for (const Term& term : point.terms) {
+    const Vector3d p_J = term.p_J + term.weight * correction;
+    if (term.level < 0) {
+      p += p_J;
+    } else {
+      const auto level = static_cast<std::size_t>(term.level);
+      p += term.weight * chain.centres_M[level] + chain.R_MJ[level] * p_J;
     }
   }
-  for (Eigen::Index level = 0; 3 * level < n; ++level) {
-    const auto l = static_cast<std::size_t>(level);
-    const Vector3d lever = kinematics.p_M[point] - kinematics.centres_M[l];
-    const Vector3d m = kinematics.R_M_parent[l].transpose() * lever.cross(c);
-    curvature.block<3, 3>(3 * level, 3 * level) +=
-        math::left_jacobian_derivative_so3(kinematics.q_rad.segment<3>(3 * level), m);
+  return p;
+}
+
+PointJacobian HandModel::jacobian(Finger finger, std::size_t index, const FingerChain& chain) const noexcept {
+  const Point& point = at(finger, index);
+  Vector3d correction = Vector3d::Zero();
+  if (point.corrected) correction = point.correctives * corrective_features(chain);
+  PointJacobian J = PointJacobian::Zero();
+  Matrix3d R_blend = Matrix3d::Zero();
+  for (const Term& term : point.terms) {
+    if (term.level < 0) {
+      R_blend += term.weight * Matrix3d::Identity();
+      continue;
+    }
+    const auto level = static_cast<std::size_t>(term.level);
+    R_blend += term.weight * chain.R_MJ[level];
+    const Vector3d lever = chain.R_MJ[level] * (term.p_J + term.weight * correction);
+    for (std::size_t l = 0; l <= level; ++l) {
+      const Vector3d u = term.weight * (chain.centres_M[level] - chain.centres_M[l]) + lever;
+      for (Index i = 3 * idx(l); i < 3 * idx(l + 1); ++i) J.col(i) += chain.axes_M.col(i).cross(u);
+    }
   }
+  if (point.corrected) {
+    for (std::size_t level = 0; level < 3; ++level) {
+      const Matrix3d R = chain.R_M_parent[level].transpose() * chain.R_MJ[level];
+      const Matrix3d axes = chain.R_M_parent[level].transpose() * chain.axes_M.middleCols<3>(3 * idx(level));
+      for (Index i = 0; i < 3; ++i) {
+        Eigen::Matrix<double, 9, 1> dR;  // row-major derivative of the joint's rotation
+        for (Index col = 0; col < 3; ++col) {
+          const Vector3d d = axes.col(i).cross(R.col(col));
+          for (Index row = 0; row < 3; ++row) dR(3 * row + col) = d(row);
+        }
+        J.col(3 * idx(level) + i) += R_blend * (point.correctives.middleCols<9>(9 * idx(level)) * dR);
+      }
+    }
+  }
+  return J;
+}
+
+void HandModel::add_curvature(Finger finger, std::size_t index, const FingerChain& chain, const Vector3d& c,
+                              Matrix9& curvature) const noexcept {
+  // With axes w_a, w_b of joints A <= B and lever u from joint B: d2p/da db = w_a x (w_b x u), plus (dw_a/db) x u when
+  // A = B.
+  for (const Term& term : at(finger, index).terms) {
+    if (term.level < 0) continue;
+    const auto last = static_cast<std::size_t>(term.level);
+    const Vector3d lever = chain.R_MJ[last] * term.p_J;
+    for (std::size_t B = 0; B <= last; ++B) {
+      const Vector3d u = term.weight * (chain.centres_M[last] - chain.centres_M[B]) + lever;
+      for (Index b = 3 * idx(B); b < 3 * idx(B + 1); ++b) {
+        const Vector3d d = chain.axes_M.col(b).cross(u).cross(c);  // c . (w_a x v) = w_a . (v x c)
+        for (Index a = 0; a < 3 * idx(B + 1); ++a) {
+          const double s = chain.axes_M.col(a).dot(d);
+          curvature(a, b) += s;
+          if (a < 3 * idx(B)) curvature(b, a) += s;
+        }
+      }
+      const Vector3d m = chain.R_M_parent[B].transpose() * u.cross(c);
+      curvature.block<3, 3>(3 * idx(B), 3 * idx(B)) +=
+          math::left_jacobian_derivative_so3(chain.q_rad.segment<3>(3 * idx(B)), m);
+    }
+  }
+}
+
+std::array<Vector3d, 2> HandModel::finger_points(Finger finger, const Vector9& q_rad) const noexcept {
+  const FingerChain at_q = chain(finger, q_rad);
+  return {point(finger, 0, at_q), point(finger, 1, at_q)};
 }
 
 }  // namespace embody::hand

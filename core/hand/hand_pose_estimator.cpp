@@ -27,8 +27,8 @@ bool hand_frame(const Eigen::Vector3d& p_W_top, const Eigen::Vector3d& p_W_left,
   return true;
 }
 
-HandPoseEstimator::HandPoseEstimator(const GloveLayout& glove, const Pose& X_HM) noexcept
-    : back_slots_(glove.back_slots), X_HM_(X_HM) {}
+HandPoseEstimator::HandPoseEstimator(const GloveLayout& glove, const Pose& X_HM, const TriadConfig& config) noexcept
+    : back_slots_(glove.back_slots), X_HM_(X_HM), triad_(glove.back_edges_m, config) {}
 
 HandPose HandPoseEstimator::step(const MarkerFrame& frame) noexcept {
   ++last_.sequence;
@@ -36,14 +36,29 @@ HandPose HandPoseEstimator::step(const MarkerFrame& frame) noexcept {
   last_.t_capture = frame.t_capture;
   last_.t_arrival = frame.t_arrival;
   last_.valid = false;
-  std::array<Eigen::Vector3d, 3> p_W;
+  last_.fit_error_m = 0.0;
+  Triad p_W;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t slot = back_slots_[i];
-    if (slot >= frame.count || slot >= kMaxMarkers || !frame.markers[slot].visible) return last_;
+    const bool seen = slot < frame.count && slot < kMaxMarkers && frame.markers[slot].visible;
+    if (!seen) {
+      triad_.missing();
+      return last_;
+    }
     p_W[i] = frame.markers[slot].p_W;
   }
-  if (!hand_frame(p_W[0], p_W[1], p_W[2], last_.X_WH)) return last_;
-  last_.X_WM = last_.X_WH * X_HM_;
+  // First as labelled: a triad that spans no plane says nothing about shapes.
+  Pose X_WH = last_.X_WH;
+  if (!hand_frame(p_W[0], p_W[1], p_W[2], X_WH)) {
+    triad_.missing();
+    return last_;
+  }
+  const TriadState state = triad_.step(p_W);
+  last_.fit_error_m = triad_.error_m();
+  if (!triad_.usable()) return last_;
+  if (state == TriadState::kRelabelled && !hand_frame(p_W[0], p_W[1], p_W[2], X_WH)) return last_;
+  last_.X_WH = X_WH;
+  last_.X_WM = X_WH * X_HM_;
   last_.valid = true;
   return last_;
 }

@@ -2,6 +2,7 @@
 // Pose of the human hand from the three markers on its back: the cheap half of the record mapping.
 #include "core/hal/types.hpp"
 #include "core/hand/glove_layout.hpp"
+#include "core/hand/triad_check.hpp"
 
 namespace embody::hand {
 
@@ -14,16 +15,22 @@ namespace embody::hand {
 /// Steps once per marker frame, in the order of the frames.
 class HandPoseEstimator {
  public:
-  /// `X_HM`: base of the hand model in the marker frame, a calibration of glove and subject.
-  HandPoseEstimator(const GloveLayout& glove, const Pose& X_HM) noexcept;
+  /// `X_HM`: base of the hand model in the marker frame, a calibration of glove and subject. The shape of the triad is
+  /// the glove's `back_edges_m`, or learnt when that is zero.
+  HandPoseEstimator(const GloveLayout& glove, const Pose& X_HM, const TriadConfig& config = {}) noexcept;
 
-  /// X_WM = X_WH * X_HM. When a marker of the triad is missing or the triad is degenerate, the pose is not valid and
-  /// keeps its last value. About 0.1 us, no heap. t_decoded and t_estimated are the caller's: core reads no clock.
+  /// X_WM = X_WH * X_HM. When a marker of the triad is missing, or the triad is degenerate or not the known one
+  /// (triad_check.hpp), the pose is not valid and keeps its last value. About 0.2 us, no heap. t_decoded and
+  /// t_estimated are the caller's: core reads no clock.
   [[nodiscard]] HandPose step(const MarkerFrame& frame) noexcept;
+
+  /// What became of the triad of the last frame.
+  [[nodiscard]] const TriadCheck& triad() const noexcept { return triad_; }
 
  private:
   std::array<std::size_t, 3> back_slots_;
   Pose X_HM_;
+  TriadCheck triad_;
   HandPose last_;
 };
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace embody::math {
 
@@ -99,48 +100,47 @@ template <class Square, class Variables>
 
 }  // namespace detail
 
-/// Minimises ||r(x)||^2 in the box from the warm start `x`, which may lie outside (it is projected first).
-/// `evaluate(x, model)` fills r and J (and curvature, if it knows it) and must be noexcept; for bounded sizes it also
-/// sizes r and J. The result is a local minimum of the basin of the start; its cost never exceeds the start's.
-/// @pre lower <= upper, all finite.
-template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
-[[nodiscard]] LeastSquaresResult<typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables> solve_bounded_least_squares(
-    const Evaluate& evaluate, const typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables& start,
-    const typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables& lower,
-    const typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables& upper,
+/// Second-order model of half a cost at one point, as the minimiser uses it.
+template <int N, int MaxN = N>
+struct NewtonModel {
+  using Variables = Eigen::Matrix<double, N, 1, 0, MaxN, 1>;
+  using Square = Eigen::Matrix<double, N, N, 0, MaxN, MaxN>;
+
+  double cost{0.0};     ///< not halved: ||r||^2
+  Variables gradient;   ///< of half the cost: J^T r
+  Square gauss_newton;  ///< J^T J
+  Square curvature;     ///< what the Hessian of half the cost has beyond gauss_newton; zero: Gauss-Newton
+};
+
+/// Minimises a cost in the box from the warm start `x`, which may lie outside (it is projected first).
+/// `evaluate(x, model)` fills all of the model and must be noexcept. The result is a local minimum of the basin of the
+/// start; its cost never exceeds the start's.
+/// @pre lower <= upper, all finite; gauss_newton is positive semidefinite.
+template <int N, int MaxN = N, class Evaluate>
+[[nodiscard]] LeastSquaresResult<typename NewtonModel<N, MaxN>::Variables> minimize_in_box(
+    const Evaluate& evaluate, const typename NewtonModel<N, MaxN>::Variables& start,
+    const typename NewtonModel<N, MaxN>::Variables& lower, const typename NewtonModel<N, MaxN>::Variables& upper,
     const LeastSquaresOptions& options = {}) noexcept {
-  using Model = LeastSquaresModel<N, M, MaxN, MaxM>;
+  using Model = NewtonModel<N, MaxN>;
   using Variables = typename Model::Variables;
   using Square = typename Model::Square;
   constexpr double kFirstDamping = 1e-3;  // relative to the diagonal of J^T J
   constexpr double kLeastDamping = 1e-7;  // below: a pure Newton step
   constexpr double kMostDamping = 1e12;
-  const auto n = start.size();
 
   Model model;
-  const auto evaluate_at = [&](const Variables& x) noexcept {
-    model.curvature = Square::Zero(n, n);
-    evaluate(x, model);
-    return model.r.squaredNorm();
-  };
-
+  Model trial;
   LeastSquaresResult<Variables> result;
   result.x = start.cwiseMax(lower).cwiseMin(upper);
-  result.cost = evaluate_at(result.x);
+  evaluate(result.x, model);
+  result.cost = model.cost;
   if (!std::isfinite(result.cost)) return result;
 
-  Variables g;
-  Square gauss_newton;
-  Square hessian;
-  const auto take_model = [&]() noexcept {
-    g = model.J.transpose().lazyProduct(model.r);
-    gauss_newton = model.J.transpose().lazyProduct(model.J);
-    hessian = gauss_newton + model.curvature;
-  };
-  take_model();
+  Square hessian = model.gauss_newton + model.curvature;
   double damping = 0.0;
   const auto raise_damping = [&]() noexcept { damping = damping > 0.0 ? 10.0 * damping : kFirstDamping; };
   for (;; ++result.iterations) {
+    const Variables& g = model.gradient;
     result.optimality = projected_gradient(result.x, g, lower, upper);
     result.status = LeastSquaresStatus::kInvalid;
     if (!std::isfinite(result.optimality)) return result;
@@ -152,13 +152,13 @@ template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
     Variables x_trial = result.x;
     const auto solve_damped = [&]() noexcept {
       Square A = hessian;
-      const double floor = 1e-12 * (1e-12 + gauss_newton.diagonal().maxCoeff());
-      A.diagonal().array() += damping * (gauss_newton.diagonal().array() + floor);
+      const double floor = 1e-12 * (1e-12 + model.gauss_newton.diagonal().maxCoeff());
+      A.diagonal().array() += damping * (model.gauss_newton.diagonal().array() + floor);
       return detail::box_newton_step(A, g, result.x, lower, upper, x_trial);
     };
     bool solved = solve_damped();
     if (!solved) {  // indefinite curvature: Gauss-Newton
-      hessian = gauss_newton;
+      hessian = model.gauss_newton;
       solved = solve_damped();
     }
     while (!solved && damping <= kMostDamping) {
@@ -167,8 +167,8 @@ template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
     }
     const Variables step = x_trial - result.x;
     const double predicted = -2.0 * g.dot(step) - step.dot(hessian.lazyProduct(step).eval());
-    const double cost_trial = evaluate_at(x_trial);
-    if (!(cost_trial < result.cost)) {
+    evaluate(x_trial, trial);
+    if (!(trial.cost < result.cost)) {
       raise_damping();
       const bool below_rounding = step.cwiseAbs().maxCoeff() <= 1e-14 * (1.0 + result.x.cwiseAbs().maxCoeff()) ||
                                   std::abs(predicted) <= 4.0 * std::numeric_limits<double>::epsilon() * result.cost;
@@ -176,16 +176,39 @@ template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
       result.status = LeastSquaresStatus::kStalled;
       return result;
     }
-    const double gain = (result.cost - cost_trial) / predicted;
+    const double gain = (result.cost - trial.cost) / predicted;
     if (predicted <= 0.0 || gain < 0.25) {
       raise_damping();
     } else if (gain > 0.75) {
       damping = damping > kLeastDamping ? 0.1 * damping : 0.0;
     }
     result.x = x_trial;
-    result.cost = cost_trial;
-    take_model();
+    result.cost = trial.cost;
+    std::swap(model, trial);
+    hessian = model.gauss_newton + model.curvature;
   }
+}
+
+/// Minimises ||r(x)||^2 in the box: minimize_in_box() for residuals that are given one by one. For bounded sizes
+/// `evaluate(x, model)` also sizes r and J. Cost and guarantees are those of minimize_in_box().
+template <int N, int M, int MaxN = N, int MaxM = M, class Evaluate>
+[[nodiscard]] LeastSquaresResult<typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables> solve_bounded_least_squares(
+    const Evaluate& evaluate, const typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables& start,
+    const typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables& lower,
+    const typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables& upper,
+    const LeastSquaresOptions& options = {}) noexcept {
+  using Variables = typename LeastSquaresModel<N, M, MaxN, MaxM>::Variables;
+  using Square = typename LeastSquaresModel<N, M, MaxN, MaxM>::Square;
+  LeastSquaresModel<N, M, MaxN, MaxM> at;
+  const auto normal_equations = [&](const Variables& x, NewtonModel<N, MaxN>& model) noexcept {
+    at.curvature = Square::Zero(x.size(), x.size());
+    evaluate(x, at);
+    model.cost = at.r.squaredNorm();
+    model.gradient = at.J.transpose().lazyProduct(at.r);
+    model.gauss_newton = at.J.transpose().lazyProduct(at.J);
+    model.curvature = at.curvature;
+  };
+  return minimize_in_box<N, MaxN>(normal_equations, start, lower, upper, options);
 }
 
 }  // namespace embody::math

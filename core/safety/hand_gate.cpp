@@ -5,29 +5,63 @@
 
 namespace embody::safety {
 
+const char* to_string(HandHold hold) noexcept {
+  switch (hold) {
+    case HandHold::kNone:
+      return "";
+    case HandHold::kModeStale:
+      return "the arm loop is late";
+    case HandHold::kMode:
+      return "not engaged";
+    case HandHold::kNoAnswer:
+      return "the robot hand has not answered";
+    case HandHold::kNotSeen:
+      return "the pose of the human hand is not known";
+    case HandHold::kTargetStale:
+      return "the finger angles are too old";
+    case HandHold::kUnsure:
+      return "confidence in the back of the human hand is below safety.min_hand_confidence";
+  }
+  return "unknown";
+}
+
+/// First reason why the hand must not move now, kNone if there is none.
+HandHold HandGate::obstacle(TimePoint now, const ModeState& mode, const FingerTarget& target,
+                            const HandDeviceState& measured) const noexcept {
+  if (now - mode.t > config_.mode_timeout) return HandHold::kModeStale;
+  if (mode.mode != Mode::kEngaged) return HandHold::kMode;
+  if (measured.reply == 0) return HandHold::kNoAnswer;
+  if (!target.valid || target.joint_count != measured.joint_count) return HandHold::kNotSeen;
+  if (now - target.t_capture > config_.target_timeout) return HandHold::kTargetStale;
+  if (!sure(target.hand_confidence)) return HandHold::kUnsure;
+  for (std::size_t i = 0; !following_ && i < measured.joint_count; ++i) {
+    if (!std::isfinite(measured.q_rad[i])) return HandHold::kNoAnswer;  // nowhere to start from
+  }
+  return HandHold::kNone;
+}
+
 HandCommand HandGate::step(TimePoint now, double dt_s, const ModeState& mode, const FingerTarget& target,
                            const HandDeviceState& measured) noexcept {
   HandCommand command;
   command.joint_count = measured.joint_count;
-  const bool mode_current = now - mode.t <= config_.mode_timeout;
-  const bool target_current = target.valid && target.joint_count == measured.joint_count && measured.reply > 0 &&
-                              now - target.t_capture <= config_.target_timeout;
-  if (!mode_current || mode.mode != Mode::kEngaged || !target_current) {
+  kept_joints_ = 0;
+  hold_ = obstacle(now, mode, target, measured);
+  if (hold_ != HandHold::kNone) {
     following_ = false;
-    command.action = mode_current && mode.mode == Mode::kStopped ? HandAction::kStop : HandAction::kHold;
+    const bool stopped = hold_ == HandHold::kMode && mode.mode == Mode::kStopped;
+    command.action = stopped ? HandAction::kStop : HandAction::kHold;
     return command;
   }
-  if (!following_) {
-    for (std::size_t i = 0; i < measured.joint_count; ++i) {
-      if (!std::isfinite(measured.q_rad[i])) return command;  // nowhere to start from: hold
-    }
-    q_rad_ = measured.q_rad;
-  }
+  if (!following_) goal_rad_ = q_rad_ = measured.q_rad;
   following_ = true;
   const double step = config_.speed_rad_s * dt_s;
   for (std::size_t i = 0; i < measured.joint_count; ++i) {
-    if (!std::isfinite(target.q_rad[i])) continue;
-    q_rad_[i] += std::clamp(target.q_rad[i] - q_rad_[i], -step, step);
+    if (!sure(target.joint_confidence[i])) {
+      kept_joints_ |= std::uint32_t{1} << i;
+    } else if (std::isfinite(target.q_rad[i])) {
+      goal_rad_[i] = target.q_rad[i];
+    }
+    q_rad_[i] += std::clamp(goal_rad_[i] - q_rad_[i], -step, step);
   }
   command.action = HandAction::kMove;
   command.q_rad = q_rad_;

@@ -16,19 +16,43 @@ namespace embody::config {
 
 inline constexpr int kSchema = 1;  ///< raised when a key changes its meaning or disappears
 
-struct TrackerConfig {
-  std::string driver{"qualisys"};
-  std::string host{"127.0.0.1"};
-  int port{22223};
-  bool allow_playback{false};
+/// Where a tracker of hand landmarks sends its datagrams (docs/landmarks.md).
+struct LandmarkConfig {
+  std::string address{"127.0.0.1"};
+  int port{21021};
+  double rate_hz{30.0};
 
   template <class V>
   void visit(V& v) {
-    v.field("driver", driver, "Which driver reads the hand tracker.");
-    v.field("host", host, "Name or address of the tracking computer.");
-    v.field("port", port, Range{1, 65535}, "TCP port; 22223 is the little-endian real-time port of QTM.");
+    v.field("address", address,
+            "IPv4 address of the interface to receive at. Whoever can send to it moves the hand: not the loopback only "
+            "in a network of its own.");
+    v.field("port", port, Range{1, 65535}, "UDP port.");
+    v.field("rate_hz", rate_hz, Range{1, 1000}, "Frames per second that the sender nominally makes.");
+  }
+};
+
+enum class TrackerDriver : std::uint8_t { kQualisys, kLandmarks };
+inline constexpr std::array<const char*, 2> kTrackerDriverNames{"qualisys", "landmarks"};
+
+struct TrackerConfig {
+  TrackerDriver driver{TrackerDriver::kQualisys};
+  std::string host{"127.0.0.1"};
+  int port{22223};
+  bool allow_playback{false};
+  LandmarkConfig landmarks;
+
+  template <class V>
+  void visit(V& v) {
+    v.choice("driver", driver, kTrackerDriverNames,
+             "qualisys: a marker glove, from Qualisys Track Manager (QTM); landmarks: 21 hand landmarks that a "
+             "camera-based tracker sends as datagrams. `[glove]` and `X_HM_exponential` belong to the glove.");
+    v.field("host", host, "qualisys: name or address of the tracking computer.");
+    v.field("port", port, Range{1, 65535}, "qualisys: TCP port; 22223 is the little-endian real-time port of QTM.");
     v.field("allow_playback", allow_playback,
-            "Accept a recording that the tracking computer plays back. Off: a robot follows live measurements only.");
+            "qualisys: accept a recording that the tracking computer plays back. Off: a robot follows live "
+            "measurements only.");
+    v.section("landmarks", landmarks, "Used with `driver = \"landmarks\"`.");
   }
 };
 
@@ -140,6 +164,7 @@ struct SafetyConfig {
   milliseconds mode_timeout{100};
   milliseconds command_lifetime{20};
   milliseconds finger_timeout{500};
+  double min_hand_confidence{0.1};
   milliseconds unreachable_grace{200};
   milliseconds arming_grace{300};
 
@@ -154,6 +179,9 @@ struct SafetyConfig {
             "A mode older than this counts as holding for the hand: the arm loop is late or dead.");
     v.field("command_lifetime_ms", command_lifetime, Range{2, 500}, "A driver refuses a command older than this.");
     v.field("finger_timeout_ms", finger_timeout, Range{50, 5000}, "Finger angles older than this are not followed.");
+    v.field("min_hand_confidence", min_hand_confidence, Range{0, 1},
+            "A robot finger keeps its last target while the confidence in a human finger that it follows is below "
+            "this; the robot hand holds while that in the back of the human hand is. 0: everything is followed.");
     v.field("unreachable_grace_ms", unreachable_grace, Range{0, 5000},
             "The hand may leave the workspace or the arm's reach for this long before the arm holds.");
     v.field("arming_grace_ms", arming_grace, Range{50, 5000},
@@ -252,15 +280,11 @@ struct ControlConfig {
   }
 };
 
-enum class Side : std::uint8_t { kRight, kLeft };
-inline constexpr std::array<const char*, 2> kSideNames{"right", "left"};
-
 struct DdsConfig {
   bool enabled{true};
   int domain{0};
   std::string interface { "lo" };
   std::vector<std::string> networks;
-  Side side{Side::kRight};
 
   template <class V>
   void visit(V& v) {
@@ -270,7 +294,6 @@ struct DdsConfig {
     v.field("networks", networks,
             "IPv4 networks (\"192.168.1.0/24\") whose datagrams are accepted. Empty: 127.0.0.0/8 and, for another "
             "interface than lo, the networks of its own addresses.");
-    v.choice("side", side, kSideNames, "Which hand: part of the topic names (rt/embody/right/...).");
   }
 };
 
@@ -323,6 +346,10 @@ struct EmbodyConfig {
     v.section("log", log, "Log messages (standard error).");
   }
 };
+
+/// `config` with the times that a sensor slower than 100 Hz needs: resample_delay_ms of at least one and a half frame
+/// periods, hold_after_ms of at least three.
+[[nodiscard]] EmbodyConfig adapted_to_sensor(EmbodyConfig config);
 
 }  // namespace embody::config
 

@@ -28,6 +28,13 @@ inline constexpr std::size_t kMaxConfigBytes = std::size_t{64} * 1024;  ///< of 
 [[nodiscard]] Result<EmbodyConfig> parse_config(std::string_view text, const std::string& name,
                                                 const std::filesystem::path& folder);
 
+/// A subject file alone, with defaults for what it does not name: what `[subject] file = PATH` means. Errors as
+/// load_config().
+[[nodiscard]] Result<SubjectConfig> load_subject(const std::filesystem::path& path);
+
+/// The text of a subject file: load_subject() of it gives the same values.
+[[nodiscard]] std::string print_toml(const SubjectConfig& subject);
+
 /// Every key with its value, as TOML without includes: load_config() of this text gives the same values.
 [[nodiscard]] std::string print_toml(const EmbodyConfig& config);
 

@@ -167,6 +167,15 @@ std::string read_value(const toml::node& node, T& value, Range range, std::strin
   return {};
 }
 
+/// An included file may leave the schema number out, but not have another one.
+void check_included_schema(const toml::table& table, const Source& inner, Load& load) {
+  const toml::node* node = table.get("schema");
+  int value = 0;
+  if (node == nullptr) return;
+  const auto why = read_value(*node, value, Range{kSchema, kSchema}, "");
+  if (!why.empty()) load.problems.push_back({place(inner, node->source()), "schema " + why});
+}
+
 /// Fills the struct `self` from one table. `table_name` is its name in its own file, for messages.
 template <class S>
 class Reader {
@@ -294,16 +303,8 @@ class Reader {
     load_.files.push_back(found);
     const Source inner{found, fs::path(found).parent_path(), true};
     const toml::table table = parse_text(*content, inner, load_);
-    check_included_schema(table, inner);
+    check_included_schema(table, inner, load_);
     Reader<S>(self_, table, "", inner, load_).run();
-  }
-
-  void check_included_schema(const toml::table& table, const Source& inner) {
-    const toml::node* node = table.get("schema");
-    int value = 0;
-    if (node == nullptr) return;
-    const auto why = read_value(*node, value, Range{kSchema, kSchema}, "");
-    if (!why.empty()) load_.problems.push_back({place(inner, node->source()), "schema " + why});
   }
 
   std::string locate(const char* key, const std::string& text, const toml::source_region& region) {
@@ -361,6 +362,23 @@ Result<EmbodyConfig> parse_config(std::string_view text, const std::string& name
   if (!load.problems.empty()) return to_error(load);
   config.files = std::move(load.files);
   return config;
+}
+
+Result<SubjectConfig> load_subject(const fs::path& path) {
+  const auto content = read_file(path);
+  if (!content) return content.error();
+  std::error_code ignored;
+  Load load;
+  const Source source{path.string(), fs::absolute(path, ignored).parent_path(), true};
+  const toml::table table = parse_text(*content, source, load);
+  check_included_schema(table, source, load);
+  SubjectConfig subject;
+  if (load.problems.empty()) Reader<SubjectConfig>(subject, table, "", source, load).run();
+  if (load.problems.empty()) {
+    if (const std::string why = subject.problem(); !why.empty()) load.problems.push_back({source.name, why});
+  }
+  if (!load.problems.empty()) return to_error(load);
+  return subject;
 }
 
 }  // namespace embody::config

@@ -66,7 +66,8 @@ std::string join(const std::string& table, const char* key) {
 /// Writes the fields of one table; sub-tables follow after them.
 class Printer {
  public:
-  explicit Printer(std::string table) : table_(std::move(table)) {}
+  /// @param included text for a file that a table's key `file` names, and which has no such key itself
+  explicit Printer(std::string table, bool included = false) : table_(std::move(table)), included_(included) {}
 
   void schema(int& value, const char*) { line("schema", value_text(value)); }
   template <class T>
@@ -82,7 +83,9 @@ class Printer {
     line(key, '"' + std::string(names.at(static_cast<std::size_t>(value))) + '"');
   }
   void path(const char* key, std::string& value, const char*) { line(key, value_text(value)); }
-  void file_key(const char*, const char*) { line("file", "\"\""); }
+  void file_key(const char*, const char*) {
+    if (!included_) line("file", "\"\"");
+  }
   template <class T>
   void list(const char* key, std::vector<T>& items, const char*) {
     if (items.empty()) return line(key, "[]");
@@ -109,6 +112,7 @@ class Printer {
   void line(const char* key, const std::string& value) { fields_ += std::string(key) + " = " + value + "\n"; }
 
   std::string table_;
+  bool included_{false};
   std::string fields_;
   std::string tables_;
 };
@@ -208,15 +212,16 @@ class Documenter {
 }  // namespace
 
 std::string_view unit_of(std::string_view key) noexcept {
-  constexpr std::array<std::array<std::string_view, 2>, 9> kUnits{{{"_rad_s2", "rad/s2"},
-                                                                   {"_rad_s", "rad/s"},
-                                                                   {"_m_s", "m/s"},
-                                                                   {"_rad", "rad"},
-                                                                   {"_ms", "ms"},
-                                                                   {"_hz", "Hz"},
-                                                                   {"_percent", "%"},
-                                                                   {"_m", "m"},
-                                                                   {"_s", "s"}}};
+  constexpr std::array<std::array<std::string_view, 2>, 10> kUnits{{{"_rad_s2", "rad/s2"},
+                                                                    {"_rad_s", "rad/s"},
+                                                                    {"_m_s", "m/s"},
+                                                                    {"_m_rad", "m/rad"},
+                                                                    {"_rad", "rad"},
+                                                                    {"_ms", "ms"},
+                                                                    {"_hz", "Hz"},
+                                                                    {"_percent", "%"},
+                                                                    {"_m", "m"},
+                                                                    {"_s", "s"}}};
   for (const auto& [suffix, unit] : kUnits) {
     if (key.ends_with(suffix)) return unit;
   }
@@ -228,6 +233,13 @@ std::string print_toml(const EmbodyConfig& config) {
   Printer printer("");
   copy.visit(printer);
   return printer.text();
+}
+
+std::string print_toml(const SubjectConfig& subject) {
+  SubjectConfig copy = subject;
+  Printer printer("", true);
+  copy.visit(printer);
+  return "schema = " + std::to_string(kSchema) + "\n" + printer.text();
 }
 
 std::string document_config() {

@@ -32,6 +32,7 @@ Response decide(Daemon& daemon, safety::RequestKind kind) {
 control::ControlServer::Handler make_control_handler(Daemon& daemon, bool& shutdown) {
   return [&daemon, &shutdown](const Request& request) -> Response {
     if (request.command == Command::kStatus) return {true, daemon.status_json(), "", ""};
+    if (request.command == Command::kMarkers) return {true, daemon.markers_json(), "", ""};
     spdlog::info("{} asked by uid {} pid {}", control::to_string(request.command), request.peer.uid, request.peer.pid);
     switch (request.command) {
       case Command::kEngage:

@@ -6,8 +6,8 @@
 #include <tuple>
 
 #include "daemon/app/heap_guard.hpp"
+#include "daemon/app/trackers.hpp"
 #include "drivers/mia/mia_hand.hpp"
-#include "drivers/qualisys/qualisys_tracker.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/ur_rtde/ur_rtde_arm.hpp"
 
@@ -15,14 +15,6 @@ namespace embody {
 namespace {
 
 using transport::now;
-
-std::unique_ptr<HandTracker> make_tracker(const config::EmbodyConfig& config) {
-  qualisys::QualisysConfig qualisys;
-  qualisys.host = config.tracker.host;
-  qualisys.port = static_cast<std::uint16_t>(config.tracker.port);
-  qualisys.allow_playback = config.tracker.allow_playback;
-  return std::make_unique<qualisys::QualisysTracker>(qualisys, config.glove.names);
-}
 
 std::unique_ptr<ArmDriver> make_arm(const config::ArmConfig& config) {
   UrRtdeConfig ur;
@@ -55,7 +47,8 @@ ArmLoopConfig arm_loop_config(const config::EmbodyConfig& config) {
 }
 
 safety::HandGateConfig hand_gate_config(const config::EmbodyConfig& config) {
-  return {config.hand.joint_speed_rad_s, config.safety.mode_timeout, config.safety.finger_timeout};
+  return {config.hand.joint_speed_rad_s, config.safety.mode_timeout, config.safety.finger_timeout,
+          config.safety.min_hand_confidence};
 }
 
 /// A link over one baton; `service` may be empty.
@@ -79,10 +72,10 @@ Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<Statu
 
 }  // namespace
 
-Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& config) {
-  for (const auto& [key, name, known] : {std::tuple{"tracker", &config.tracker.driver, "qualisys"},
-                                         {"arm", &config.arm.driver, "ur_rtde"},
-                                         {"hand", &config.hand.driver, "mia"}}) {
+Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& given) {
+  const config::EmbodyConfig config = config::adapted_to_sensor(given);
+  for (const auto& [key, name, known] :
+       {std::tuple{"arm", &config.arm.driver, "ur_rtde"}, {"hand", &config.hand.driver, "mia"}}) {
     if (*name == known) continue;
     return make_error(Errc::kInvalidArgument, "[%s] driver = \"%s\" is unknown; this version has \"%s\"", key,
                       name->c_str(), known);
@@ -94,7 +87,7 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& confi
   dds.domain = config.dds.domain;
   dds.interface = config.dds.interface;
   dds.networks = config.dds.networks;
-  dds.side = config::kSideNames[static_cast<std::size_t>(config.dds.side)];
+  dds.side = config::kSideNames[static_cast<std::size_t>(config.subject.side)];
   Result<DdsPublisher> publisher = DdsPublisher::create(dds);
   if (!publisher) return publisher.error();
   return std::unique_ptr<Daemon>(new Daemon(config, *models, make_tracker(config), make_arm(config.arm),
@@ -110,13 +103,13 @@ Daemon::Daemon(const config::EmbodyConfig& config, const Models& models, std::un
       tracker_baton_(*tracker_),
       arm_baton_(*arm_),
       hand_baton_(*hand_),
-      tracker_loop_(tracker_baton_, models.hand_pose, edges_),
-      finger_loop_(models.fingers, models.embodiment,
+      tracker_loop_(tracker_baton_, models.hand_pose, models.predictor, edges_),
+      finger_loop_(models.fingers, models.filter, models.embodiment,
                    SlowDown{config.record_mapping.slow_down, config.record_mapping.slow_down_spins}, edges_),
       arm_loop_(arm_baton_, tracker_baton_, models.arm, mode_config(config.safety), arm_loop_config(config), edges_),
       hand_loop_(hand_baton_, hand_gate_config(config), {from_seconds(1.0 / config.hand.rate_hz)}, edges_),
       watchdog_loop_(arm_baton_, edges_),
-      telemetry_(std::make_unique<TelemetryLoop>(edges_, std::move(publisher), models.embodiment)),
+      telemetry_(std::make_unique<TelemetryLoop>(edges_, std::move(publisher), models.embodiment, models.glove)),
       links_(std::make_unique<LinksLoop>(
           make_links(), embody::LinksConfig{config.links.retry_first, config.links.retry_longest}, edges_)) {}
 
@@ -134,6 +127,16 @@ std::vector<Link> Daemon::make_links() {
 
 ThreadOptions Daemon::options(const char* name, int priority, const std::vector<int>& cpus) const {
   return {name, realtime_.scheduled ? priority : 0, cpus, true};
+}
+
+/// The reference solver allocates: its thread has normal scheduling.
+ThreadOptions Daemon::finger_options() const {
+  const config::RealtimeConfig& realtime = config_.realtime;
+  if (config_.record_mapping.solver == hand::FingerSolver::kOwn) {
+    return options("fingers", realtime.priority.fingers, realtime.cpus.fingers);
+  }
+  spdlog::warn("record_mapping.solver = \"slsqp\" allocates memory: the finger thread runs with normal scheduling");
+  return {"fingers", 0, realtime.cpus.fingers, false};
 }
 
 Status Daemon::start() {
@@ -163,8 +166,7 @@ Status Daemon::start() {
   // Consumers before producers; links last, for it connects the devices.
   if (Status s = arm_thread_.start(options("arm", p.arm, cpus.arm), [this] { arm_loop_.run(); }); !s) return s;
   if (Status s = hand_thread_.start(options("hand", p.hand, cpus.hand), [this] { hand_loop_.run(); }); !s) return s;
-  if (Status s = finger_thread_.start(options("fingers", p.fingers, cpus.fingers), [this] { finger_loop_.run(); }); !s)
-    return s;
+  if (Status s = finger_thread_.start(finger_options(), [this] { finger_loop_.run(); }); !s) return s;
   if (Status s = tracker_thread_.start(options("tracker", p.tracker, cpus.tracker), [this] { tracker_loop_.run(); });
       !s)
     return s;

@@ -57,6 +57,8 @@ class Daemon {
   [[nodiscard]] std::vector<DeviceReport> devices() const { return links_->reports(); }
   /// Everything that `embodyctl status` shows, as one JSON object.
   [[nodiscard]] std::string status_json();
+  /// Everything that `embodyctl markers` shows, as one JSON object.
+  [[nodiscard]] std::string markers_json() const;
 
  private:
   Daemon(const config::EmbodyConfig& config, const Models& models, std::unique_ptr<HandTracker> tracker,
@@ -65,6 +67,7 @@ class Daemon {
   /// `body` whose exceptions are logged and end the daemon in order.
   [[nodiscard]] std::function<void()> guarded(const char* name, std::function<void()> body);
   [[nodiscard]] ThreadOptions options(const char* name, int priority, const std::vector<int>& cpus) const;
+  [[nodiscard]] ThreadOptions finger_options() const;
 
   config::EmbodyConfig config_;
   Edges edges_;

@@ -1,6 +1,5 @@
 #include "daemon/app/models.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -18,40 +17,27 @@ Eigen::Vector3d vector3(const std::array<double, 3>& values) {
   return Eigen::Map<const Eigen::Vector3d>(values.data());
 }
 
-Result<std::size_t> slot_of(const config::GloveConfig& glove, const std::string& marker) {
-  const auto found = std::find(glove.names.begin(), glove.names.end(), marker);
-  if (found != glove.names.end()) return static_cast<std::size_t>(found - glove.names.begin());
-  return make_error(Errc::kNotFound, "[glove] names no marker '%s': add it to `names`", marker.c_str());
+hand::PoseEstimator make_hand_pose(const config::EmbodyConfig& config, const OperatorModels& models) {
+  if (config.tracker.driver == config::TrackerDriver::kLandmarks) return hand::PalmPoseEstimator(models.hand_model());
+  return hand::HandPoseEstimator(models.layout, models.X_HM);
 }
 
-Result<hand::GloveLayout> make_glove(const config::GloveConfig& glove) {
-  hand::GloveLayout layout;
-  for (const std::string& name : glove.names) layout.names.push_back(FixedString<48>(std::string_view(name)));
-  const std::array<const std::string*, 3> back{&glove.back.top, &glove.back.left, &glove.back.right};
-  for (std::size_t i = 0; i < back.size(); ++i) {
-    const Result<std::size_t> slot = slot_of(glove, *back[i]);
-    if (!slot) return slot.error();
-    layout.back_slots[i] = *slot;
-  }
-  for (const config::FingerMarkerConfig& marker : glove.finger_markers) {
-    const Result<std::size_t> slot = slot_of(glove, marker.marker);
-    if (!slot) return slot.error();
-    layout.finger_markers.push_back({marker.finger, static_cast<int>(marker.point), *slot});
-  }
-  return layout;
+hand::HandStateFilter make_filter(const config::FilterConfig& config, const hand::HandModel& model) {
+  hand::HandStateFilterConfig filter;
+  filter.lag_at_rest = config.lag_at_rest;
+  filter.lag_in_motion = config.lag_in_motion;
+  filter.motion_rad_s = config.motion_rad_s;
+  filter.predict = config.predict;
+  filter.predict_limit_rad = config.predict_limit_rad;
+  return {model, filter};
 }
 
-hand::FingerEstimator make_fingers(const config::EmbodyConfig& config, const hand::GloveLayout& glove) {
-  hand::HandModelConfig model;
-  model.skeleton =
-      config.subject.skeleton == config::Skeleton::kA ? hand::Skeleton::kBoneLengths : hand::Skeleton::kWebXr;
-  model.attachments = hand::default_attachments(model.skeleton);
-  model.shape = Eigen::Map<const Eigen::Matrix<double, 10, 1>>(config.subject.shape.data());
-  hand::FingerEstimatorConfig estimator;
-  estimator.lower_rad.fill(hand::Vector9::Constant(config.record_mapping.lower_rad));
-  estimator.upper_rad.fill(hand::Vector9::Constant(config.record_mapping.upper_rad));
-  estimator.max_iterations = config.record_mapping.max_iterations;
-  return {hand::HandModel(model), glove, estimator};
+teleop::PosePredictor make_predictor(const config::FilterConfig& config) {
+  teleop::PosePredictorConfig predictor;
+  predictor.ahead = config.predict_pose;
+  predictor.limit_m = config.predict_pose_limit_m;
+  predictor.limit_rad = config.predict_pose_limit_rad;
+  return teleop::PosePredictor(predictor);
 }
 
 Result<EmbodimentMapping> make_embodiment(const EmbodimentConfig& hand) {
@@ -90,13 +76,18 @@ teleop::ArmControllerConfig make_arm(const config::EmbodyConfig& config, const P
 }  // namespace
 
 Result<Models> make_models(const config::EmbodyConfig& config) {
-  const Result<hand::GloveLayout> glove = make_glove(config.glove);
-  if (!glove) return glove.error();
+  const Result<OperatorModels> models = make_operator_models(config);
+  if (!models) return models.error();
   Result<EmbodimentMapping> embodiment = make_embodiment(config.hand.embodiment);
   if (!embodiment) return embodiment.error();
-  const Pose X_HM = math::exp_se3(vector6(config.subject.X_HM_exponential));
+  const hand::HandModel model = models->hand_model();
   const teleop::ArmControllerConfig arm = make_arm(config, embodiment->X_PM());
-  return Models{*glove, hand::HandPoseEstimator(*glove, X_HM), make_fingers(config, *glove), std::move(*embodiment),
+  return Models{models->layout,
+                make_hand_pose(config, *models),
+                hand::FingerEstimator(model, models->layout, models->fingers),
+                make_filter(config.record_mapping.filter, model),
+                make_predictor(config.record_mapping.filter),
+                std::move(*embodiment),
                 arm};
 }
 

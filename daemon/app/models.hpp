@@ -1,24 +1,27 @@
 #pragma once
 // From the configuration to the objects of core: shared by the daemon and the simulated lab, so both mean the same.
 #include "core/embodiment/embodiment_mapping.hpp"
-#include "core/hand/finger_estimator.hpp"
-#include "core/hand/hand_pose_estimator.hpp"
+#include "core/hand/hand_state_filter.hpp"
+#include "core/hand/palm_pose_estimator.hpp"
 #include "core/teleop/arm_controller.hpp"
-#include "daemon/app/config.hpp"
+#include "core/teleop/pose_predictor.hpp"
+#include "daemon/app/operator_models.hpp"
 
 namespace embody {
 
 /// Everything that the data path is made of.
 struct Models {
-  hand::GloveLayout glove;
-  hand::HandPoseEstimator hand_pose;
+  hand::GloveLayout glove;  ///< slots of a frame: of the marker glove, or of the landmarks
+  hand::PoseEstimator hand_pose;
   hand::FingerEstimator fingers;
+  hand::HandStateFilter filter;
+  teleop::PosePredictor predictor;
   EmbodimentMapping embodiment;
   teleop::ArmControllerConfig arm;
 };
 
-/// Reads the hand's URDF and builds the models. Errors: kNotFound, kMalformed, kInvalidArgument; the sentence names the
-/// file or key.
+/// Reads the hand's URDF and the operator's hand model and builds the models. Errors: kNotFound, kMalformed,
+/// kInvalidArgument; the sentence names the file or key.
 [[nodiscard]] Result<Models> make_models(const config::EmbodyConfig& config);
 
 }  // namespace embody

@@ -4,6 +4,7 @@
 #include "daemon/app/daemon.hpp"
 #include "daemon/app/heap_guard.hpp"
 #include "daemon/app/version.hpp"
+#include "drivers/landmarks/landmark_tracker.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/ur_rtde/status_text.hpp"
 
@@ -45,6 +46,20 @@ json counters_json(const Edges& edges, const TelemetrySnapshot& telemetry, const
           {"rt_heap_allocations", heap_guard::count()}};
 }
 
+/// What became of the datagrams of a landmark tracker; empty with another tracker.
+json landmarks_json(const HandTracker& tracker, const Edges& edges) {
+  const auto* landmarks = dynamic_cast<const landmarks::LandmarkTracker*>(&tracker);
+  if (landmarks == nullptr) return json::object();
+  const landmarks::LandmarkCounters c = landmarks->counters();
+  return {{"received", c.received},
+          {"malformed", c.malformed},
+          {"foreign", c.foreign},
+          {"other_hand", c.other_hand},
+          {"duplicates", c.duplicates},
+          {"restarts", c.restarts},
+          {"palm_scale", edges.palm_scale.load(std::memory_order_relaxed)}};
+}
+
 json latency_json(const TelemetrySnapshot& telemetry) {
   json stages = json::object();
   for (std::size_t i = 0; i < kStageNames.size(); ++i) {
@@ -70,6 +85,73 @@ json residual_json(const TelemetrySnapshot& telemetry) {
   json residual = json::object();
   for (std::size_t i = 0; i < kFingers; ++i) residual[kFingerNames[i]] = telemetry.residual_mean_m[i] * 1e3;
   return residual;
+}
+
+/// What is known of the human hand, and whether the robot hand acts on it.
+json confidence_json(const TelemetrySnapshot& telemetry) {
+  json confidence{{"hand", telemetry.hand_confidence}};
+  for (std::size_t i = 0; i < kFingers; ++i) confidence[kFingerNames[i]] = telemetry.confidence[i];
+  return confidence;
+}
+
+json quality_json(const std::array<FingerQuality, kFingers>& fingers) {
+  constexpr std::array<const char*, 6> kQualityNames{"none", "optimal", "capped", "held", "at_limit", "lost"};
+  json quality = json::object();
+  for (std::size_t i = 0; i < kFingers; ++i) {
+    quality[kFingerNames[i]] = kQualityNames[static_cast<std::size_t>(fingers[i])];
+  }
+  return quality;
+}
+
+json robot_hand_json(const TelemetrySnapshot& telemetry, const std::vector<std::string>& joints) {
+  constexpr std::array<const char*, 3> kActionNames{"holds", "moves", "stopped"};
+  json kept = json::array();
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if ((telemetry.kept_joints >> i & 1U) != 0) kept.push_back(joints[i]);
+  }
+  return {{"action", kActionNames[static_cast<std::size_t>(telemetry.hand_action)]},
+          {"cause", safety::to_string(telemetry.hand_hold)},
+          {"unsure_joints", kept}};
+}
+
+json marker_json(const MarkerRow& row) {
+  json marker{{"label", row.label},
+              {"finger", row.finger},
+              {"point", row.point},
+              {"seen", row.seen},
+              {"seen_percent", 100.0 * row.seen_fraction},
+              {"verdict", hand::kMarkerVerdictNames[static_cast<std::size_t>(row.verdict)]}};
+  if (!row.source.empty()) marker["from"] = row.source;
+  if (row.residual_m) marker["residual_mm"] = *row.residual_m * 1e3;
+  if (row.seen) marker["p_W_m"] = {row.p_W.x(), row.p_W.y(), row.p_W.z()};
+  return marker;
+}
+
+json back_json(const BackRow& back) {
+  constexpr std::array<const char*, 3> kEdges{"top_left", "top_right", "left_right"};
+  json edges = json::object(), reference = json::object();
+  for (std::size_t i = 0; i < kEdges.size(); ++i) {
+    if (back.edges_m[i]) edges[kEdges[i]] = *back.edges_m[i] * 1e3;
+    if (back.reference_m[i] > 0.0) reference[kEdges[i]] = back.reference_m[i] * 1e3;
+  }
+  return {{"state", back.state},
+          {"ambiguous", back.ambiguous},
+          {"edges_mm", edges},
+          {"reference_mm", reference},
+          {"fit_error_mm", back.fit_error_m * 1e3}};
+}
+
+/// Delay that smoothing adds to the finger angles, net of prediction.
+json filter_json(const Edges& edges, const config::FilterConfig& config) {
+  json lag = json::object();
+  for (std::size_t i = 0; i < kFingers; ++i) {
+    lag[kFingerNames[i]] = to_seconds(Duration{edges.filter_lag_ns[i].load(std::memory_order_relaxed)}) * 1e3;
+  }
+  return {{"lag_ms", lag},
+          {"lag_at_rest_ms", config.lag_at_rest.count()},
+          {"lag_in_motion_ms", config.lag_in_motion.count()},
+          {"predict_ms", config.predict.count()},
+          {"predict_pose_ms", config.predict_pose.count()}};
 }
 
 json devices_json(const std::vector<DeviceReport>& reports) {
@@ -98,10 +180,15 @@ std::string Daemon::status_json() {
                       {"arm", telemetry.arm_hz},
                       {"hand", telemetry.hand_hz},
                       {"fingers", telemetry.fingers_hz}}},
+                    {"landmarks", landmarks_json(*tracker_, edges_)},
                     {"counters", counters_json(edges_, telemetry, mode_now)},
                     {"latency_us", latency_json(telemetry)},
                     {"resample_delay_ms", config_.arm.resample_delay.count()},
+                    {"filter", filter_json(edges_, config_.record_mapping.filter)},
                     {"marker_residual_mm", residual_json(telemetry)},
+                    {"confidence", confidence_json(telemetry)},
+                    {"quality", quality_json(telemetry.quality)},
+                    {"robot_hand", robot_hand_json(telemetry, config_.hand.embodiment.motors)},
                     {"tracking",
                      {{"arm_error_mm", telemetry.arm_error_m * 1e3},
                       {"arm_error_rad", telemetry.arm_error_rad},
@@ -113,6 +200,21 @@ std::string Daemon::status_json() {
                       {"heap_counted", heap_guard::active()},
                       {"warning", realtime_.warning}}}};
   return status.dump(-1, ' ', false, json::error_handler_t::replace);  // devices may say anything
+}
+
+std::string Daemon::markers_json() const {
+  const TelemetrySnapshot telemetry = telemetry_->snapshot();
+  const MarkersView& view = telemetry.markers;
+  json markers{{"frame_number", view.frame_number},
+               {"frames", view.frames},
+               {"valid", view.valid},
+               {"confidence", confidence_json(telemetry)},
+               {"quality", quality_json(view.quality)},
+               {"markers", json::array()},
+               {"back", back_json(view.back)},
+               {"findings", view.findings}};
+  for (const MarkerRow& row : view.rows) markers["markers"].push_back(marker_json(row));
+  return markers.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 }  // namespace embody

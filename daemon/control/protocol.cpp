@@ -9,8 +9,8 @@ namespace {
 using nlohmann::json;                    // sorted: requests of strangers with many members stay cheap
 using Ordered = nlohmann::ordered_json;  // answers of the daemon keep its order
 
-constexpr std::array<const char*, 7> kCommands{"status", "engage",   "disengage", "stop",
-                                               "reset",  "shutdown", "subscribe"};
+constexpr std::array<const char*, 8> kCommands{"status", "engage",   "disengage", "stop",
+                                               "reset",  "shutdown", "subscribe", "markers"};
 constexpr std::int64_t kShortestIntervalMs = 20;
 constexpr std::int64_t kLongestIntervalMs = 60'000;
 

@@ -17,7 +17,7 @@ inline constexpr int kProtocol = 1;  ///< version of the messages
 inline constexpr std::size_t kMaxLineBytes =
     std::size_t{64} * 1024;  ///< of a request; a longer line ends the connection
 
-enum class Command : std::uint8_t { kStatus, kEngage, kDisengage, kStop, kReset, kShutdown, kSubscribe };
+enum class Command : std::uint8_t { kStatus, kEngage, kDisengage, kStop, kReset, kShutdown, kSubscribe, kMarkers };
 
 /// Name on the wire, e.g. "engage".
 [[nodiscard]] const char* to_string(Command command) noexcept;

@@ -14,7 +14,15 @@ struct Command {
 
 /// status, engage, disengage, stop, reset, shutdown: the clients of the control socket.
 void add_control_commands(CLI::App& app, int& exit_code);
+/// markers: what became of each marker of the glove, live.
+void add_markers_command(CLI::App& app, int& exit_code);
 /// demo: simulated lab, daemon and operator in one.
 void add_demo_command(CLI::App& app, int& exit_code);
+/// import-mano: a user's own hand model.
+void add_import_mano_command(CLI::App& app, int& exit_code);
+/// calibrate: a subject file from free finger motion.
+void add_calibrate_command(CLI::App& app, int& exit_code);
+/// evaluate: judges the record mapping on recordings.
+void add_evaluate_command(CLI::App& app, int& exit_code);
 
 }  // namespace embody::ctl

@@ -11,7 +11,11 @@ namespace {
 
 constexpr std::array kCommands{
     embody::ctl::Command{&embody::ctl::add_control_commands},
+    embody::ctl::Command{&embody::ctl::add_markers_command},
     embody::ctl::Command{&embody::ctl::add_demo_command},
+    embody::ctl::Command{&embody::ctl::add_import_mano_command},
+    embody::ctl::Command{&embody::ctl::add_calibrate_command},
+    embody::ctl::Command{&embody::ctl::add_evaluate_command},
 };
 
 constexpr const char* kFooter =

@@ -127,6 +127,22 @@ void add_latency(Table& table, const json& latency) {
   }
 }
 
+/// Delay of each finger now, between which limits it moves, and what is predicted.
+void add_filter(Table& table, const json& filter) {
+  if (!filter.is_object()) return;
+  std::string text = "lag";
+  if (const json& lag = member(filter, "lag_ms"); lag.is_object()) {
+    for (const auto& [finger, ms] : lag.items()) text += " " + printable(finger) + " " + text_of(ms);
+  }
+  const auto ahead = [&filter](const char* key) {
+    const json& ms = member(filter, key);
+    return ms.is_number() && ms == 0 ? std::string("off") : text_of(ms) + " ms";
+  };
+  table.line("filter", text + " ms (" + text_of(member(filter, "lag_at_rest_ms")) + " at rest, " +
+                           text_of(member(filter, "lag_in_motion_ms")) + " in motion)");
+  table.line("filter", "prediction: fingers " + ahead("predict_ms") + ", hand pose " + ahead("predict_pose_ms"));
+}
+
 void add_realtime(Table& table, const json& realtime) {
   if (!realtime.is_object()) return;
   const auto flag = [&realtime](const char* key, const char* yes, const char* no) {
@@ -161,14 +177,20 @@ std::string status_table(const std::string& json_text) {
   table.pairs("robot", member(status, "robot"), "");
   table.pairs("rates", member(status, "rates_hz"), " Hz");
   table.pairs("residuals", member(status, "marker_residual_mm"), " mm");
+  add_filter(table, member(status, "filter"));
+  table.pairs("confidence", member(status, "confidence"), "");
+  table.pairs("quality", member(status, "quality"), "");
+  table.pairs("robot hand", member(status, "robot_hand"), "");
   table.pairs("tracking", member(status, "tracking"), "");
   add_latency(table, member(status, "latency_us"));
   add_realtime(table, member(status, "realtime"));
+  table.pairs("landmarks", member(status, "landmarks"), "");
   table.pairs("counters", member(status, "counters"), "");
 
   static const std::set<std::string> kKnown{
-      "version",  "uptime_s",           "mode",     "devices", "rates_hz", "counters", "latency_us",
-      "realtime", "marker_residual_mm", "tracking", "robot"};
+      "version",  "uptime_s",           "mode",     "devices", "rates_hz",  "counters", "latency_us",
+      "realtime", "marker_residual_mm", "tracking", "robot",   "landmarks", "filter",   "confidence",
+      "quality",  "robot_hand"};
   json others = json::object();
   for (const auto& [key, value] : status.items()) {
     if (kKnown.count(key) == 0) others[key] = value;

@@ -134,7 +134,7 @@ class DdsPublisher::Impl {
     return {published_.load(std::memory_order_relaxed), failed_.load(std::memory_order_relaxed)};
   }
 
-  dds_entity_t joint_states{0}, hand_pose{0}, hand_state{0}, status{0};
+  dds_entity_t joint_states{0}, hand_pose{0}, hand_state{0}, markers{0}, status{0};
   std::size_t filtered_sockets{0};
 
  private:
@@ -188,6 +188,7 @@ Status DdsPublisher::Impl::open_writers(const DdsConfig& config) {
   } outputs[] = {{joint_states, side + "/joint_states", sensor_msgs_msg_dds__JointState__desc},
                  {hand_pose, side + "/hand_pose", geometry_msgs_msg_dds__PoseStamped__desc},
                  {hand_state, side + "/hand_state", embody_msgs_msg_dds__HandState__desc},
+                 {markers, side + "/markers", embody_msgs_msg_dds__Markers__desc},
                  {status, "rt/embody/status", embody_msgs_msg_dds__Status__desc}};
   for (const auto& output : outputs) {
     const auto writer = open_writer(output.topic, output.type);
@@ -262,8 +263,32 @@ bool DdsPublisher::publish_hand_state(const HandState& hand) {
   std::copy(hand.visible_markers.begin(), hand.visible_markers.end(), sample.visible_markers);
   std::transform(hand.quality.begin(), hand.quality.end(), sample.quality,
                  [](FingerQuality quality) { return static_cast<std::uint8_t>(quality); });
+  std::copy(hand.confidence.begin(), hand.confidence.end(), sample.confidence);
+  sample.hand_confidence = hand.hand_confidence;
   sample.valid = hand.valid;
   return impl_->write(impl_->hand_state, &sample);
+}
+
+bool DdsPublisher::publish_markers(const MarkersSample& markers) {
+  if (!impl_) return false;
+  std::vector<embody_msgs_msg_dds__Marker_> rows;
+  for (const auto& m : markers.markers)
+    rows.push_back({c_text(m.name),
+                    m.finger,
+                    m.seen,
+                    m.verdict,
+                    c_text(m.source),
+                    {m.p_W.x(), m.p_W.y(), m.p_W.z()},
+                    m.residual_m});
+  Names findings(markers.findings.size());
+  std::transform(markers.findings.begin(), markers.findings.end(), findings.begin(), c_text);
+  const embody_msgs_msg_dds__Markers_ sample{markers.frame_number,
+                                             markers.t_capture.time_since_epoch().count(),
+                                             borrow<dds_sequence_embody_msgs_msg_dds__Marker_>(rows),
+                                             c_text(markers.back),
+                                             markers.back_fit_error_m,
+                                             borrow<dds_sequence_string>(findings)};
+  return impl_->write(impl_->markers, &sample);
 }
 
 bool DdsPublisher::publish_status(const StatusSample& status) {

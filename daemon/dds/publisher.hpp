@@ -1,5 +1,5 @@
 #pragma once
-// What embodyd shows on DDS: four topics with ROS 2-compatible names and types (docs/dds.md). Observation only: nothing
+// What embodyd shows on DDS: five topics with ROS 2-compatible names and types (docs/dds.md). Observation only: nothing
 // is ever read from the network. Call everything from a normal (SCHED_OTHER) thread: creating the publisher starts
 // Cyclone's threads, which inherit the caller's scheduling, and publishing allocates.
 #include <chrono>
@@ -58,6 +58,28 @@ struct StatusSample {
   std::vector<Latency> latencies;
 };
 
+/// Published on rt/embody/<side>/markers.
+struct MarkersSample {
+  static constexpr std::uint8_t kBack = 254;
+  static constexpr std::uint8_t kNoFinger = 255;
+
+  struct Marker {
+    std::string name;
+    std::uint8_t finger{kNoFinger};  ///< index of Finger, kBack or kNoFinger
+    bool seen{false};
+    std::uint8_t verdict{0};  ///< hand::MarkerVerdict
+    std::string source;
+    Eigen::Vector3d p_W{0.0, 0.0, 0.0};
+    double residual_m{-1.0};  ///< negative: not fitted
+  };
+  std::uint64_t frame_number{0};
+  WallTime t_capture{};
+  std::vector<Marker> markers;
+  std::string back;
+  double back_fit_error_m{0.0};
+  std::vector<std::string> findings;
+};
+
 /// Owns the DDS domain, its participant and the writers. Writers are reliable, keep the last ten samples and never
 /// wait for a reader: a sample that cannot be handed over at once is dropped and counted.
 class DdsPublisher {
@@ -84,6 +106,7 @@ class DdsPublisher {
   bool publish_hand_pose(const Pose& X_WM, std::string_view frame_id, WallTime stamp);
   /// Stamps of `hand` are mapped to the wall clock here.
   bool publish_hand_state(const HandState& hand);
+  bool publish_markers(const MarkersSample& sample);
   bool publish_status(const StatusSample& status);
 
   [[nodiscard]] Counters counters() const noexcept;

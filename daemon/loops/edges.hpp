@@ -6,6 +6,9 @@
 #include "core/hal/hand_driver.hpp"
 #include "core/hal/hand_tracker.hpp"
 #include "core/hal/types.hpp"
+#include "core/hand/marker_guard.hpp"
+#include "core/hand/triad_check.hpp"
+#include "core/safety/hand_gate.hpp"
 #include "core/safety/mode_machine.hpp"
 #include "daemon/handoff/baton.hpp"
 #include "daemon/handoff/event_ring.hpp"
@@ -14,11 +17,21 @@
 
 namespace embody {
 
+/// The markers on the back of the hand in one frame (core/hand/triad_check.hpp).
+struct BackReport {
+  bool checked{false};  ///< false: a sensor without such markers; nothing else is set
+  bool ambiguous{false};
+  hand::TriadState state{hand::TriadState::kMissing};
+  std::array<std::uint8_t, 3> source{0, 1, 2};
+  hand::TriadEdges reference_m{};  ///< zeros: not known
+};
+
 /// A frame together with the hand pose estimated from it.
 struct TrackedFrame {
   std::uint64_t sequence{0};  ///< of HandPose; a gap is a skipped frame
   MarkerFrame frame;
   HandPose pose;
+  BackReport back;
 };
 
 /// What the arm loop shows of one tick.
@@ -33,12 +46,35 @@ struct ArmReport {
 struct HandReport {
   HandDeviceState state;
   HandCommand command;
+  safety::HandHold hold{safety::HandHold::kNoAnswer};
+  std::uint32_t kept_joints{0};  ///< bit per joint that kept its last sure target
+};
+
+/// What became of each marker since the start: whoever looks now and then misses nothing.
+struct MarkerTally {
+  std::uint32_t frames{0};
+  std::array<std::uint32_t, kMaxMarkers> seen{};  ///< by slot: frames in which the sensor measured it
+  std::array<std::array<std::uint32_t, hand::kMarkerVerdictNames.size()>, kMaxMarkers> verdicts{};  ///< by slot
+  std::array<std::uint32_t, hand::kTriadStateNames.size()> back{};
+
+  void add(const TrackedFrame& tracked, const hand::CheckedMarkers& markers) noexcept {
+    const MarkerFrame& frame = tracked.frame;
+    ++frames;
+    if (tracked.back.checked) ++back[static_cast<std::size_t>(tracked.back.state)];
+    for (std::size_t slot = 0; slot < kMaxMarkers; ++slot) {
+      if (slot < frame.count && frame.markers[slot].visible) ++seen[slot];
+      ++verdicts[slot][static_cast<std::size_t>(markers.verdict[slot])];
+    }
+  }
 };
 
 /// What the finger loop shows of one frame.
 struct FingerReport {
   HandState state;
   FingerTarget target;
+  TrackedFrame tracked;
+  hand::CheckedMarkers markers;
+  MarkerTally tally;
 };
 
 /// Times along the path of one hand pose into the first arm command that used it.
@@ -89,11 +125,13 @@ struct Heartbeats {
 
 struct Edges {
   // tracker ->
+  std::atomic<double> palm_scale{0.0};  ///< landmarks: PalmPoseEstimator::palm_scale()
   Latest<TrackedFrame> frame_to_fingers;
   Latest<HandPose> pose_to_arm;
   Latest<HandPose> pose_to_telemetry;
   Wake fingers_wake;
   // fingers ->
+  std::array<std::atomic<Duration::rep>, kFingers> filter_lag_ns{};  ///< hand::HandStateFilter::lag()
   Latest<FingerTarget> target_to_hand;
   Latest<FingerReport> fingers_to_telemetry;
   EventRing<FingerTiming, 256> finger_timings;

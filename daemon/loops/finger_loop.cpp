@@ -4,11 +4,22 @@
 #include <cstdlib>
 #include <ctime>
 
+#include "core/hand/confidence.hpp"
 #include "drivers/transport/clock.hpp"
 
 namespace embody {
 
 using transport::now;
+
+namespace {
+
+/// Of the pose that everything else is measured in. Sensors without back markers judge their pose themselves.
+double back_confidence(const TrackedFrame& tracked) noexcept {
+  if (!tracked.back.checked) return tracked.pose.valid ? 1.0 : 0.0;
+  return hand::hand_confidence(tracked.pose.valid, tracked.pose.fit_error_m, {}, {});
+}
+
+}  // namespace
 
 void FingerLoop::run() noexcept {
   while (!edges_.stop.load(std::memory_order_relaxed)) {
@@ -22,12 +33,20 @@ void FingerLoop::run() noexcept {
 void FingerLoop::use(const TrackedFrame& tracked) noexcept {
   const TimePoint t_start = now();
   estimator_.step(tracked.frame, tracked.pose, report_.state);
+  filter_.step(report_.state);
   report_.state.t_estimated = now();
   mapping_.step(report_.state, report_.target);
+  report_.target.hand_confidence = back_confidence(tracked);
   slow_down(t_start);
   const TimePoint t_solved = now();
   report_.target.t_solved = t_solved;
   edges_.target_to_hand.publish(report_.target);
+  for (std::size_t i = 0; i < kFingers; ++i) {
+    edges_.filter_lag_ns[i].store(filter_.lag()[i].count(), std::memory_order_relaxed);
+  }
+  report_.tracked = tracked;
+  report_.markers = estimator_.markers();
+  report_.tally.add(tracked, report_.markers);
   edges_.fingers_to_telemetry.publish(report_);
   edges_.finger_timings.push(
       {tracked.pose.t_arrival, t_start, t_solved, report_.state.residual_m, report_.state.visible_markers});

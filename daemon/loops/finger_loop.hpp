@@ -2,6 +2,7 @@
 // Newest marker frame in, robot finger angles out. Slow frames cost this loop only: the arm never waits for it.
 #include "core/embodiment/embodiment_mapping.hpp"
 #include "core/hand/finger_estimator.hpp"
+#include "core/hand/hand_state_filter.hpp"
 #include "daemon/loops/edges.hpp"
 
 namespace embody {
@@ -14,9 +15,9 @@ struct SlowDown {
 
 class FingerLoop {
  public:
-  FingerLoop(const hand::FingerEstimator& estimator, const EmbodimentMapping& mapping, const SlowDown& slow_down,
-             Edges& edges)
-      : estimator_(estimator), mapping_(mapping), edges_(edges) {
+  FingerLoop(const hand::FingerEstimator& estimator, const hand::HandStateFilter& filter,
+             const EmbodimentMapping& mapping, const SlowDown& slow_down, Edges& edges)
+      : estimator_(estimator), filter_(filter), mapping_(mapping), edges_(edges) {
     set_slow_down(slow_down);
   }
   /// Until edges.stop. No heap, lock, log or exception.
@@ -34,6 +35,7 @@ class FingerLoop {
   [[nodiscard]] bool duty_exceeded(TimePoint now) noexcept;
 
   hand::FingerEstimator estimator_;
+  hand::HandStateFilter filter_;
   EmbodimentMapping mapping_;
   std::atomic<Duration::rep> slow_down_ns_{0};  // negative: spin
   Edges& edges_;

@@ -55,6 +55,8 @@ void HandLoop::cycle(TimePoint t) noexcept {
     edges_.counters.hand_commands.fetch_add(1, std::memory_order_relaxed);
   }
   report_.command = command;
+  report_.hold = gate_.hold();
+  report_.kept_joints = gate_.kept_joints();
   edges_.hand_to_telemetry.publish(report_);
 }
 

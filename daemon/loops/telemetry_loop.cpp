@@ -11,14 +11,16 @@
 namespace embody {
 namespace {
 
+constexpr auto kMarkersPeriod = std::chrono::milliseconds(100);
 constexpr auto kRelaxed = std::memory_order_relaxed;
 constexpr std::array<const char*, 6> kArmJoints{"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
                                                 "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
 
 }  // namespace
 
-TelemetryLoop::TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand)
-    : edges_(edges), publisher_(std::move(publisher)), hand_(std::move(hand)) {
+TelemetryLoop::TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand,
+                             const hand::GloveLayout& glove)
+    : edges_(edges), publisher_(std::move(publisher)), hand_(std::move(hand)), markers_(glove) {
   joint_names_.assign(kArmJoints.begin(), kArmJoints.end());
   joint_names_.insert(joint_names_.end(), hand_.urdf_joint_names().begin(), hand_.urdf_joint_names().end());
 }
@@ -33,6 +35,7 @@ void TelemetryLoop::run() {
     measure_errors();
     measure_rates(transport::now());
     log_mode();
+    log_hand_hold();
     publish(transport::now());
     const std::lock_guard lock(mutex_);
     shared_ = data_;
@@ -50,7 +53,11 @@ void TelemetryLoop::take() {
   if ((new_fingers_ = edges_.fingers_to_telemetry.update())) {
     fingers_ = edges_.fingers_to_telemetry.get();
     data_.residual_now_m = fingers_.state.residual_m;
+    data_.quality = fingers_.state.quality;
+    data_.confidence = fingers_.state.confidence;
+    data_.hand_confidence = fingers_.state.hand_confidence;
   }
+  watch_markers(transport::now());
   if ((new_arm_ = edges_.arm_to_telemetry.update())) {
     const ArmReport& report = edges_.arm_to_telemetry.get();
     data_.arm = report.state;
@@ -60,7 +67,17 @@ void TelemetryLoop::take() {
   if (edges_.hand_to_telemetry.update()) {
     hand_report_ = edges_.hand_to_telemetry.get();
     data_.hand = hand_report_.state;
+    data_.hand_action = hand_report_.command.action;
+    data_.hand_hold = hand_report_.hold;
+    data_.kept_joints = hand_report_.kept_joints;
   }
+}
+
+void TelemetryLoop::watch_markers(TimePoint now) {
+  markers_.add(fingers_, now);
+  if (now - t_markers_ < kMarkersPeriod) return;
+  t_markers_ = now;
+  data_.markers = markers_.view();
 }
 
 void TelemetryLoop::take_timings() {
@@ -121,6 +138,14 @@ void TelemetryLoop::log_mode() {
               cause.empty() ? "" : ": ", cause);
 }
 
+/// The hand stands still although the arm moves: say why, once.
+void TelemetryLoop::log_hand_hold() {
+  const bool unsure = data_.hand_hold == safety::HandHold::kUnsure;
+  if (unsure && !unsure_) spdlog::warn("the robot hand holds: {}", safety::to_string(data_.hand_hold));
+  if (!unsure && unsure_ && data_.hand_hold == safety::HandHold::kNone) spdlog::info("the robot hand follows again");
+  unsure_ = unsure;
+}
+
 void TelemetryLoop::publish(TimePoint now) {
   if (new_arm_ && data_.arm.package > 0) publish_joint_states();
   if (new_pose_) {
@@ -128,6 +153,7 @@ void TelemetryLoop::publish(TimePoint now) {
     if (pose.valid) publisher_.publish_hand_pose(pose.X_WM, "mocap", to_wall_time(pose.t_capture));
   }
   if (new_fingers_) publisher_.publish_hand_state(fingers_.state);
+  if (data_.markers.frame_number != published_markers_) publish_markers();
   if (now - t_status_ > std::chrono::milliseconds(200)) {
     publish_status();
     t_status_ = now;
@@ -168,6 +194,23 @@ void TelemetryLoop::publish_status() {
                                 histogram.quantile_us(0.99), histogram.quantile_us(0.999), histogram.max_us()});
   }
   publisher_.publish_status(sample);
+}
+
+/// At most as often as the view is made.
+void TelemetryLoop::publish_markers() {
+  const MarkersView& view = data_.markers;
+  published_markers_ = view.frame_number;
+  MarkersSample sample{view.frame_number, to_wall_time(view.t_capture), {},
+                       view.back.state,   view.back.fit_error_m,        view.findings};
+  for (const MarkerRow& row : view.rows) {
+    const auto* finger = std::find(kFingerNames.begin(), kFingerNames.end(), row.finger);
+    const std::uint8_t index = finger != kFingerNames.end() ? static_cast<std::uint8_t>(finger - kFingerNames.begin())
+                               : row.finger == "back"       ? MarkersSample::kBack
+                                                            : MarkersSample::kNoFinger;
+    sample.markers.push_back({row.label, index, row.seen, static_cast<std::uint8_t>(row.verdict), row.source, row.p_W,
+                              row.residual_m.value_or(-1.0)});
+  }
+  publisher_.publish_markers(sample);
 }
 
 }  // namespace embody

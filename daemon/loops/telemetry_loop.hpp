@@ -8,7 +8,7 @@
 #include "core/embodiment/embodiment_mapping.hpp"
 #include "daemon/app/histogram.hpp"
 #include "daemon/dds/publisher.hpp"
-#include "daemon/loops/edges.hpp"
+#include "daemon/loops/marker_watch.hpp"
 
 namespace embody {
 
@@ -32,14 +32,21 @@ struct TelemetrySnapshot {
   double hand_error_rad{0.0};  ///< largest difference of a finger joint to its target, now
   ArmState arm;
   HandDeviceState hand;
+  HandAction hand_action{HandAction::kHold};
+  safety::HandHold hand_hold{safety::HandHold::kNoAnswer};
+  std::uint32_t kept_joints{0};  ///< of the robot hand, bit per joint: keeps its last sure target
+  std::array<FingerQuality, kFingers> quality{};
+  std::array<double, kFingers> confidence{};
+  double hand_confidence{0.0};
+  MarkersView markers;
   std::uint64_t dds_published{0};
   std::uint64_t dds_failed{0};
 };
 
 class TelemetryLoop {
  public:
-  /// `hand` names and completes the hand's joints for the topics.
-  TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand);
+  /// `hand` names and completes the hand's joints for the topics, `glove` names the markers.
+  TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand, const hand::GloveLayout& glove);
   /// Until edges.stop.
   void run();
   /// Any thread.
@@ -48,13 +55,16 @@ class TelemetryLoop {
  private:
   void take();
   void take_timings();
+  void watch_markers(TimePoint now);
   [[nodiscard]] Histogram& latency(Stage stage) { return data_.latency[static_cast<std::size_t>(stage)]; }
   void measure_errors();
   void measure_rates(TimePoint now);
   void log_mode();
+  void log_hand_hold();
   void publish(TimePoint now);
   void publish_joint_states();
   void publish_status();
+  void publish_markers();
 
   Edges& edges_;
   DdsPublisher publisher_;
@@ -65,6 +75,7 @@ class TelemetryLoop {
   Pose X_BEd_{Pose::Identity()};
   FingerReport fingers_;
   HandReport hand_report_;
+  MarkerWatch markers_;
   bool new_pose_{false};
   bool new_fingers_{false};
   bool new_arm_{false};
@@ -74,6 +85,9 @@ class TelemetryLoop {
   TimePoint t_rates_{};
   std::array<std::uint64_t, 4> rate_counts_{};
   TimePoint t_status_{};
+  TimePoint t_markers_{};
+  std::uint64_t published_markers_{0};
+  bool unsure_{false};
 
   mutable std::mutex mutex_;
   TelemetrySnapshot shared_;

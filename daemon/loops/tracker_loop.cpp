@@ -34,7 +34,8 @@ void TrackerLoop::drain() noexcept {
     any = true;
   }
   if (!any) return;
-  edges_.pose_to_arm.publish(tracked_.pose);
+  edges_.palm_scale.store(estimator_.palm_scale(), std::memory_order_relaxed);
+  edges_.pose_to_arm.publish(ahead_);
   edges_.frame_to_fingers.publish(tracked_);
   edges_.fingers_wake.notify();
   edges_.pose_to_telemetry.publish(tracked_.pose);
@@ -43,10 +44,15 @@ void TrackerLoop::drain() noexcept {
 void TrackerLoop::use() noexcept {
   const TimePoint t_decoded = now();
   tracked_.pose = estimator_.step(tracked_.frame);
+  if (const hand::TriadCheck* triad = estimator_.triad(); triad != nullptr) {
+    tracked_.back = {true, triad->ambiguous(), triad->state(), triad->source(), triad->reference_m()};
+  }
   monitor_.step(tracked_.pose);
   tracked_.pose.sequence = ++sequence_;
   tracked_.pose.t_decoded = t_decoded;
-  tracked_.pose.t_estimated = now();
+  ahead_ = tracked_.pose;
+  predictor_.step(ahead_);
+  tracked_.pose.t_estimated = ahead_.t_estimated = now();
   tracked_.sequence = sequence_;
   edges_.counters.frames_received.fetch_add(1, std::memory_order_relaxed);
   if (tracked_.pose.valid) {

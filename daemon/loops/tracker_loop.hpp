@@ -1,15 +1,17 @@
 #pragma once
 // Marker frames in, hand poses out: one step per frame, in order.
-#include "core/hand/hand_pose_estimator.hpp"
+#include "core/hand/palm_pose_estimator.hpp"
 #include "core/teleop/pose_monitor.hpp"
+#include "core/teleop/pose_predictor.hpp"
 #include "daemon/loops/edges.hpp"
 
 namespace embody {
 
 class TrackerLoop {
  public:
-  TrackerLoop(TrackerBaton& baton, const hand::HandPoseEstimator& estimator, Edges& edges) noexcept
-      : baton_(baton), estimator_(estimator), edges_(edges) {}
+  TrackerLoop(TrackerBaton& baton, const hand::PoseEstimator& estimator, const teleop::PosePredictor& predictor,
+              Edges& edges) noexcept
+      : baton_(baton), estimator_(estimator), predictor_(predictor), edges_(edges) {}
   /// Until edges.stop. No heap, lock, log or exception.
   void run() noexcept;
 
@@ -18,10 +20,12 @@ class TrackerLoop {
   void use() noexcept;
 
   TrackerBaton& baton_;
-  hand::HandPoseEstimator estimator_;
+  hand::PoseEstimator estimator_;
   teleop::PoseMonitor monitor_;
+  teleop::PosePredictor predictor_;
   Edges& edges_;
-  TrackedFrame tracked_;
+  TrackedFrame tracked_;  // as measured: fingers and observers
+  HandPose ahead_;        // predicted: the arm
   std::uint64_t sequence_{0};
 };
 

@@ -108,12 +108,15 @@ Status Lab::fault(const std::string& command) {
   std::string device;
   std::string what;
   std::string argument;
-  words >> device >> what >> argument;
+  std::string second;
+  words >> device >> what >> argument >> second;
   const std::string key = device + " " + what;
   if (key == "qtm disconnect") return qtm_.disconnect_clients(), Status{};
   if (key == "qtm pause") return qtm_.pause(std::chrono::milliseconds(std::atoi(argument.c_str()))), Status{};
   if (key == "qtm hide" && qtm_.set_marker_hidden(argument, true)) return {};
   if (key == "qtm show" && qtm_.set_marker_hidden(argument, false)) return {};
+  if (key == "qtm swap" && qtm_.swap_labels(argument, second)) return {};
+  if (key == "qtm ghost" && (on(second) || second == "off") && qtm_.set_ghost(argument, on(second))) return {};
   if (key == "ur protective_stop") return ur_.protective_stop(), Status{};
   if (key == "ur emergency_stop") return ur_.emergency_stop(), Status{};
   if (key == "ur clear_stop") return ur_.clear_stop(), Status{};

@@ -38,9 +38,10 @@ class Lab {
   [[nodiscard]] std::size_t frame_count() const noexcept { return recording_.frames.size(); }
   [[nodiscard]] double rate_hz() const noexcept { return recording_.rate_hz; }
 
-  /// Makes a fault happen: "qtm disconnect", "qtm pause MS", "qtm hide MARKER", "qtm show MARKER", "ur
-  /// protective_stop", "ur emergency_stop", "ur clear_stop", "ur disconnect", "ur freeze on|off", "ur program on|off",
-  /// "mia unplug", "mia plug", "mia mute on|off". Errors: kInvalidArgument.
+  /// Makes a fault happen: "qtm disconnect", "qtm pause MS", "qtm hide MARKER", "qtm show MARKER",
+  /// "qtm swap MARKER MARKER", "qtm ghost MARKER on|off", "ur protective_stop", "ur emergency_stop", "ur clear_stop",
+  /// "ur disconnect", "ur freeze on|off", "ur program on|off", "mia unplug", "mia plug", "mia mute on|off". Errors:
+  /// kInvalidArgument.
   Status fault(const std::string& command);
 
   /// Judgement and counts as one JSON object.

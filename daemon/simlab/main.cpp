@@ -15,6 +15,7 @@
 #include "daemon/control/exit_code.hpp"
 #include "daemon/simlab/demo_recording.hpp"
 #include "daemon/simlab/lab.hpp"
+#include "daemon/simlab/landmark_sender.hpp"
 #include "drivers/recording/tsv_recording.hpp"
 
 namespace {
@@ -125,6 +126,45 @@ int generate(const std::string& output, double duration_s, std::uint64_t seed) {
   return saved ? kExitOk : fail(saved.error());
 }
 
+/// What `embody-sim landmarks` sends.
+struct LandmarkOptions {
+  std::string recording;
+  double duration_s{sim::kDemoDuration_s};
+  std::uint64_t seed{sim::kDemoSeed};
+  sim::LandmarkSenderConfig sender;
+};
+
+int send_landmarks(LandmarkOptions options) {
+  StopSignals signals;
+  Result<sim::LandmarkRecording> recording =
+      options.recording.empty() ? sim::make_landmarks(options.sender.rate_hz, options.duration_s, options.seed)
+                                : sim::load_landmarks(options.recording);
+  if (!recording) return fail(recording.error());
+  say({{"event", "ready"},
+       {"port", options.sender.port},
+       {"frames", recording->size()},
+       {"rate_hz", options.sender.rate_hz}});
+  const auto report = sim::send_landmarks(std::move(*recording), options.sender, signals);
+  if (!report) return fail(report.error());
+  say({{"event", "playback_finished"}, {"sent", report->sent}, {"unheard", report->unheard}});
+  return kExitOk;
+}
+
+void add_landmark_options(CLI::App& command, LandmarkOptions& options) {
+  command.add_option("recording", options.recording, "Table of landmarks (CSV) to send; without it a motion is made");
+  command.add_option("--rate", options.sender.rate_hz, "Frames per second")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
+  command.add_option("--host", options.sender.host, "IPv4 address to send to")->capture_default_str();
+  command.add_option("--port", options.sender.port, "UDP port to send to")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  command.add_option("--duration", options.duration_s, "Seconds of the motion that is made")
+      ->check(CLI::Range(1.0, 600.0));
+  command.add_option("--seed", options.seed, "Seed of its noise");
+  command.add_flag("--loop", options.sender.loop, "Begin again after the last frame, until a signal");
+}
+
 int run_program(int argc, char** argv) {
   CLI::App app{"The simulated lab of embody: QTM server, UR10e controller and Mia hand with real bytes on loopback."};
   app.set_version_flag("--version", std::string("embody-sim ") + kVersion);
@@ -152,11 +192,17 @@ int run_program(int argc, char** argv) {
   generate_command->add_option("--duration", duration_s, "Length in seconds")->check(CLI::Range(5.0, 600.0));
   generate_command->add_option("--seed", seed, "Seed of noise and drop-outs");
 
+  LandmarkOptions landmarks;
+  CLI::App* landmarks_command =
+      app.add_subcommand("landmarks", "Send hand landmarks as a camera-based tracker would (docs/landmarks.md)");
+  add_landmark_options(*landmarks_command, landmarks);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitOk : kExitUsage;
   }
+  if (*landmarks_command) return send_landmarks(landmarks);
   return *generate_command ? generate(output, duration_s, seed) : run_lab(config_file, lab, wait_for_play);
 }
 

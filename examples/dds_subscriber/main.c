@@ -1,4 +1,4 @@
-// Prints what embodyd shows on DDS: joint states, hand pose, hand state and status.
+// Prints what embodyd shows on DDS: joint states, hand pose, hand state, markers and status.
 //   embody-dds-subscriber [--domain N] [--side right] [--count N] [--timeout SECONDS]
 // Ends after --count samples or --timeout seconds (default: never). Exit code 1: not one sample came, or DDS failed.
 // Without $CYCLONEDDS_URI it listens on the loopback only, like the daemon.
@@ -12,7 +12,7 @@
 #include "embody_msgs.h"
 #include "sensor_msgs.h"
 
-enum { kTopics = 4, kBatch = 16 };
+enum { kTopics = 5, kBatch = 16 };
 
 static const char kLoopbackOnly[] =
     "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" "
@@ -67,7 +67,21 @@ static void print_hand_state(const void* sample) {
   print_pose(&s->pose);
   printf(", residual");
   for (int finger = 0; finger < 5; ++finger) printf(" %.1f", 1e3 * s->residual_m[finger]);
-  printf(" mm\n");
+  printf(" mm, confidence %.2f\n", s->hand_confidence);
+}
+
+static void print_markers(const void* sample) {
+  static const char* const kVerdicts[] = {"none", "missing", "used", "relabelled", "jumped", "ghost"};
+  const embody_msgs_msg_dds__Markers_* s = sample;
+  printf("[%" PRId64 ".%09" PRId64 "] markers %" PRIu64 ":", s->capture_ns / 1000000000, s->capture_ns % 1000000000,
+         s->frame_number);
+  for (uint32_t i = 0; i < s->markers._length; ++i) {
+    const embody_msgs_msg_dds__Marker_* m = &s->markers._buffer[i];
+    printf(" %s %s", m->name, m->verdict < 6 ? kVerdicts[m->verdict] : "?");
+  }
+  if (s->back[0] != '\0') printf(", back %s (%.1f mm)", s->back, 1e3 * s->back_fit_error_m);
+  for (uint32_t i = 0; i < s->findings._length; ++i) printf("; %s", s->findings._buffer[i]);
+  printf("\n");
 }
 
 static void print_status(const void* sample) {
@@ -96,6 +110,7 @@ static const struct topic kTopicList[kTopics] = {
     {"joint_states", true, &sensor_msgs_msg_dds__JointState__desc, print_joint_states},
     {"hand_pose", true, &geometry_msgs_msg_dds__PoseStamped__desc, print_hand_pose},
     {"hand_state", true, &embody_msgs_msg_dds__HandState__desc, print_hand_state},
+    {"markers", true, &embody_msgs_msg_dds__Markers__desc, print_markers},
     {"status", false, &embody_msgs_msg_dds__Status__desc, print_status},
 };
 

@@ -56,6 +56,12 @@ class QtmServer {
   void disconnect_clients();
   /// Fault: the marker is missing from the next frame on, until shown again. False: no such label.
   bool set_marker_hidden(std::string_view name, bool hidden);
+  /// Fault: from the next frame on each of the two labels follows the other one's marker; again: as before. False: no
+  /// such labels.
+  bool swap_labels(std::string_view a, std::string_view b);
+  /// Fault: from the next frame on the label follows a reflection that stands still in the room, 0.1 m from where the
+  /// marker is in that frame, until switched off. False: no such label.
+  bool set_ghost(std::string_view name, bool on);
   /// Fault: the label list changes without an event, as when somebody edits it in QTM. False: no such label.
   bool rename_label(std::string_view from, std::string_view to);
 

@@ -60,10 +60,8 @@ void hand_pose(benchmark::State& state) {
 BENCHMARK(hand_pose)->Unit(benchmark::kMillisecond)->Iterations(3);
 
 void five_fingers(benchmark::State& state) {
-  HandModelConfig config;
-  config.skeleton = state.range(0) == 0 ? Skeleton::kBoneLengths : Skeleton::kWebXr;
-  config.attachments = default_attachments(config.skeleton);
-  const HandModel model(config);
+  const HandData data = builtin_hand(state.range(0) == 0 ? Skeleton::kBoneLengths : Skeleton::kWebXr, Side::kRight);
+  const HandModel model(data, Shape::Zero(), default_points(data));
   std::vector<double> us;
   std::array<double, kFingers> residual_mm{};
   std::array<std::size_t, kFingers> solved{};

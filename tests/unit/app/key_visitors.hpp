@@ -55,6 +55,8 @@ class Randomiser : public WalkingVisitor<Randomiser> {
   template <class T>
   void value(const std::string& key, T& member, Range range) {
     static const std::set<std::string> kFixed{"names",
+                                              "shape",
+                                              "back_edges_m",
                                               "top",
                                               "left",
                                               "right",

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/ctl/markers_view.hpp"
 #include "daemon/ctl/status_table.hpp"
 #include "tests/unit/control/serving.hpp"
 
@@ -30,8 +31,20 @@ const char* const kStatus = R"({"version":"1.2.3","uptime_s":3725,
   "counters":{"frames_received":123456,"holds":2},
   "latency_us":{"decode":{"p50":12,"p99":40,"p999":80.5,"max":120},"arm":{"p50":3}},
   "marker_residual_mm":{"thumb":5.25,"index":4},
+  "filter":{"lag_ms":{"thumb":400.0,"index":12.5},"lag_at_rest_ms":400,"lag_in_motion_ms":10,
+            "predict_ms":0,"predict_pose_ms":40},
   "realtime":{"mode":"try","scheduled":false,"locked":true,"warning":"no rights"},
   "novelty":42})";
+
+const char* const kMarkers = R"({"frame_number":4711,"frames":100,"valid":true,
+  "confidence":{"hand":0.75,"thumb":1,"index":0.75},"quality":{"thumb":"optimal","index":"held"},
+  "markers":[
+    {"label":"hand_top","finger":"back","point":"top","seen":true,"seen_percent":100,"verdict":"used"},
+    {"label":"index_tip","finger":"index","point":"tip","seen":true,"seen_percent":87.5,"verdict":"relabelled",
+     "from":"middle_tip","residual_mm":1.25},
+    {"label":"ring_tip","finger":"ring","point":"tip","seen":false,"seen_percent":0,"verdict":"missing"}],
+  "back":{"state":"good","edges_mm":{"top_left":51.25},"reference_mm":{"top_left":51.5},"fit_error_mm":0.25},
+  "findings":["index_tip and middle_tip are probably swapped"]})";
 
 struct Outcome {
   int exit_code{-1};
@@ -100,6 +113,8 @@ class EmbodyCtl : public ::testing::Test {
     switch (request.command) {
       case Command::kStatus:
         return {true, kStatus, "", ""};
+      case Command::kMarkers:
+        return {true, kMarkers, "", ""};
       case Command::kEngage:
         return control::refusal(control::code::kRefused, "the tracker is missing");
       case Command::kReset:
@@ -167,6 +182,77 @@ TEST_F(EmbodyCtl, WatchGoesOnUntilInterrupted) {
   EXPECT_EQ(program.finish().exit_code, 130);
 }
 
+TEST_F(EmbodyCtl, MarkersOnceIsATableOrTheDaemonsJson) {
+  const Outcome table = run({"markers", "--once"});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_EQ(table.output, markers_table(kMarkers));
+  EXPECT_EQ(json::parse(run({"markers", "--once", "--json"}).output), json::parse(kMarkers));
+}
+
+TEST_F(EmbodyCtl, MarkersGoOnLineByLineUntilInterrupted) {
+  Program program(with_socket({"markers", "--interval-ms", "20"}), false);
+  std::string text;
+  while (std::count(text.begin(), text.end(), '\n') < 3) {
+    const std::string piece = program.read_some();
+    ASSERT_FALSE(piece.empty()) << "ended by itself";
+    text += piece;
+  }
+  EXPECT_EQ(text.rfind(markers_line(kMarkers), 0), 0U);
+  EXPECT_EQ(text.find('\x1b'), std::string::npos) << "no terminal, no control characters";
+  ASSERT_EQ(::kill(program.pid(), SIGINT), 0);
+  EXPECT_EQ(program.finish().exit_code, 130);
+}
+
+TEST_F(EmbodyCtl, MarkersWithoutADaemonSaySo) {
+  const Outcome outcome = Program({"markers", "--socket", folder_.path() + "/none.sock"}, false).finish();
+  EXPECT_EQ(outcome.exit_code, 69);
+  EXPECT_NE(outcome.errors.find("embodyd is not running"), std::string::npos);
+}
+
+TEST(MarkersView, HasARowPerMarkerTheBackAndTheSentences) {
+  const std::string table = markers_table(kMarkers);
+  for (const char* part :
+       {"frame 4711, 100 in the last second", "back top", "relabelled from middle_tip", "yes 88 %", "1.2 mm", "no  0 %",
+        "missing", "back of the hand   good, top-left 51.2 of 51.5 mm", "fit error 0.25 mm", "hand 0.75",
+        "index 0.75 held", "! index_tip and middle_tip are probably swapped"}) {
+    EXPECT_NE(table.find(part), std::string::npos) << part << " is missing in\n" << table;
+  }
+  const std::string line = markers_line(kMarkers);
+  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1);
+  for (const char* part : {"2 of 3 markers seen", "ring_tip missing", "probably swapped"}) {
+    EXPECT_NE(line.find(part), std::string::npos) << part << " is missing in\n" << line;
+  }
+}
+
+TEST(MarkersView, EveryMemberMayBeMissingOrOfAnyType) {
+  const json whole = json::parse(kMarkers);
+  for (const auto& [key, value] : whole.items()) {
+    json changed = whole;
+    changed.erase(key);
+    EXPECT_FALSE(markers_table(changed.dump()).empty());
+    EXPECT_FALSE(markers_line(changed.dump()).empty());
+    for (const json& other : {json(nullptr), json(1.5), json("x"), json(true), json::array({1}),
+                              json{{"top_left", "x"}, {"hand", json::array()}, {"state", 3}}}) {
+      changed[key] = other;
+      EXPECT_FALSE(markers_table(changed.dump()).empty()) << key << " " << other;
+      EXPECT_FALSE(markers_line(changed.dump()).empty()) << key << " " << other;
+    }
+  }
+  for (const char* text : {"", "{}", "[]", "null", "{", "\xff"}) {
+    EXPECT_FALSE(markers_table(text).empty());
+    EXPECT_FALSE(markers_line(text).empty());
+  }
+}
+
+TEST(MarkersView, LabelsOfATrackerCannotSteerTheTerminal) {
+  const std::string text = R"({"markers":[{"label":"\u001b[2J","finger":"\u0007","verdict":"ghost"}],
+                               "findings":["\u001b[31m"]})";
+  for (const std::string& shown : {markers_table(text), markers_line(text)}) {
+    EXPECT_EQ(shown.find('\x1b'), std::string::npos);
+    EXPECT_EQ(shown.find('\x07'), std::string::npos);
+  }
+}
+
 TEST_F(EmbodyCtl, AnotherUserIsToldThatHeMayNot) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
   ASSERT_EQ(::chmod(folder_.path().c_str(), 0755), 0);
@@ -194,9 +280,11 @@ TEST_F(EmbodyCtl, WrongUsageEndsWithTwoAndHelpWithZero) {
 
 TEST(StatusTable, ShowsEverythingThatTheDaemonSaid) {
   const std::string table = status_table(kStatus);
-  for (const char* part : {"1.2.3, up 1 h 2 min", "holding (tracker stale), for 2.5 s", "connection refused",
-                           "127.0.0.1:22223", "tracker 100.0", "frames_received 123456", "80.5", "thumb 5.25",
-                           "no real-time scheduling, memory locked", "warning: no rights", "novelty 42"}) {
+  for (const char* part :
+       {"1.2.3, up 1 h 2 min", "holding (tracker stale), for 2.5 s", "connection refused", "127.0.0.1:22223",
+        "tracker 100.0", "frames_received 123456", "80.5", "thumb 5.25",
+        "lag thumb 400.0 index 12.5 ms (400 at rest, 10 in motion)", "prediction: fingers off, hand pose 40 ms",
+        "no real-time scheduling, memory locked", "warning: no rights", "novelty 42"}) {
     EXPECT_NE(table.find(part), std::string::npos) << part << " is missing in\n" << table;
   }
 }

@@ -9,7 +9,7 @@ namespace embody::control {
 namespace {
 
 constexpr std::array kAll{Command::kStatus, Command::kEngage,   Command::kDisengage, Command::kStop,
-                          Command::kReset,  Command::kShutdown, Command::kSubscribe};
+                          Command::kReset,  Command::kShutdown, Command::kSubscribe, Command::kMarkers};
 
 std::string refusal_of(std::string_view line) {
   const auto request = parse_request(line);

@@ -114,8 +114,10 @@ TEST(DdsPublisher, HandStatesArriveExactlyAndWithWallClockStamps) {
   for (std::size_t i = 0; i < kHandAngles; ++i) hand.q_rad(static_cast<int>(i)) = 0.01 * static_cast<double>(i);
   hand.residual_m = {0.001, 0.002, 0.003, 0.004, 0.005};
   hand.visible_markers = {2, 1, 0, 2, 1};
-  hand.quality = {FingerQuality::kNone, FingerQuality::kOptimal, FingerQuality::kCapped, FingerQuality::kHeld,
-                  FingerQuality::kOptimal};
+  hand.quality = {FingerQuality::kNone, FingerQuality::kAtLimit, FingerQuality::kCapped, FingerQuality::kHeld,
+                  FingerQuality::kLost};
+  hand.confidence = {0.0, 0.25, 0.5, 0.75, 1.0};
+  hand.hand_confidence = 0.125;
   hand.valid = true;
   const auto wall_now = std::chrono::system_clock::now();
   ASSERT_TRUE(publisher->publish_hand_state(hand));
@@ -130,9 +132,45 @@ TEST(DdsPublisher, HandStatesArriveExactlyAndWithWallClockStamps) {
   EXPECT_TRUE(std::equal(hand.q_rad.begin(), hand.q_rad.end(), std::begin(m->q_rad), std::end(m->q_rad)));
   EXPECT_TRUE(std::equal(hand.residual_m.begin(), hand.residual_m.end(), m->residual_m));
   EXPECT_TRUE(std::equal(hand.visible_markers.begin(), hand.visible_markers.end(), m->visible_markers));
-  const std::array<std::uint8_t, 5> quality{0, 1, 2, 3, 1};
+  const std::array<std::uint8_t, 5> quality{0, 4, 2, 3, 5};
   EXPECT_TRUE(std::equal(quality.begin(), quality.end(), m->quality));
+  EXPECT_TRUE(std::equal(hand.confidence.begin(), hand.confidence.end(), m->confidence));
+  EXPECT_EQ(m->hand_confidence, hand.hand_confidence);
   EXPECT_TRUE(m->valid);
+}
+
+TEST(DdsPublisher, MarkersArriveExactly) {
+  auto publisher = DdsPublisher::create(private_config());
+  ASSERT_TRUE(publisher) << publisher.error().detail.c_str();
+  Reader<embody_msgs_msg_dds__Markers_> reader(embody_msgs_msg_dds__Markers__desc, "rt/embody/right/markers");
+  MarkersSample sample;
+  sample.frame_number = 0x1234'5678'9abc'def0;
+  sample.t_capture = wall(1'700'000'000'123'456'789);
+  sample.markers.push_back({"index_tip", 1, true, 3, "middle_tip", {1.0, 2.0, 3.0}, 0.004});
+  sample.markers.push_back({"hand_top", MarkersSample::kBack, false, 1, "", {}, -1.0});
+  sample.back = "good";
+  sample.back_fit_error_m = 0.0005;
+  sample.findings = {"index_tip and middle_tip are probably swapped", "ring_tip is not seen"};
+  ASSERT_TRUE(publisher->publish_markers(sample));
+  const auto* m = reader.next();
+  ASSERT_NE(m, nullptr);
+  EXPECT_EQ(m->frame_number, sample.frame_number);
+  EXPECT_EQ(m->capture_ns, 1'700'000'000'123'456'789);
+  ASSERT_EQ(m->markers._length, 2U);
+  const auto& tip = m->markers._buffer[0];
+  EXPECT_STREQ(tip.name, "index_tip");
+  EXPECT_EQ(tip.finger, 1);
+  EXPECT_TRUE(tip.seen);
+  EXPECT_EQ(tip.verdict, 3);
+  EXPECT_STREQ(tip.source, "middle_tip");
+  EXPECT_EQ(tip.position[2], 3.0);
+  EXPECT_EQ(tip.residual_m, 0.004);
+  EXPECT_EQ(m->markers._buffer[1].finger, 254);
+  EXPECT_EQ(m->markers._buffer[1].residual_m, -1.0);
+  EXPECT_STREQ(m->back, "good");
+  EXPECT_EQ(m->back_fit_error_m, 0.0005);
+  ASSERT_EQ(m->findings._length, 2U);
+  EXPECT_STREQ(m->findings._buffer[1], "ring_tip is not seen");
 }
 
 TEST(DdsPublisher, StatusArrivesExactly) {
@@ -210,6 +248,7 @@ TEST(DdsPublisher, TopicsAndTypesAreNamedAsRos2NamesThem) {
       {"rt/embody/left/joint_states", "sensor_msgs::msg::dds_::JointState_"},
       {"rt/embody/left/hand_pose", "geometry_msgs::msg::dds_::PoseStamped_"},
       {"rt/embody/left/hand_state", "embody_msgs::msg::dds_::HandState_"},
+      {"rt/embody/left/markers", "embody_msgs::msg::dds_::Markers_"},
       {"rt/embody/status", "embody_msgs::msg::dds_::Status_"}};
   EXPECT_EQ(announced_writers(), expected);
 }

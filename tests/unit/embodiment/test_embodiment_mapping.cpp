@@ -257,6 +257,20 @@ TEST(EmbodimentMapping, PassesTimesOnAndRepeatsTheLastAnglesWhenTheHandIsInvalid
   EXPECT_TRUE(target.valid);
 }
 
+TEST(EmbodimentMapping, AJointIsAsSureAsTheLeastSureFingerThatItFollows) {
+  EmbodimentMapping mapping = make(test::mia_config());
+  HandState state = state_of(mapping, mapping.finger_points(std::array<double, 3>{0.2, 0.4, 0.6}));
+  state.confidence = {0.9, 0.8, 0.7, 0.3, 0.6};
+  FingerTarget target;
+  mapping.step(state, target);
+  EXPECT_EQ(target.joint_confidence[0], 0.9) << "thumb";
+  EXPECT_EQ(target.joint_confidence[1], 0.8) << "index";
+  EXPECT_EQ(target.joint_confidence[2], 0.3) << "middle, ring and little finger share a motor";
+  state.confidence = {0.1, 0.2, 0.3, 0.4, 0.5};
+  mapping.step(state, target);
+  EXPECT_EQ(target.joint_confidence[2], 0.3) << "nothing is kept from the last step";
+}
+
 TEST(EmbodimentMapping, StartsAtTheAngleNearestToZeroBeforeTheFirstValidHand) {
   EmbodimentConfig config = test::mia_config();
   config.motor_lower_rad[1] = 0.3;

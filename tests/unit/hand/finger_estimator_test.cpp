@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <nlopt.hpp>
 #include <vector>
 
 #include "core/hand/hand_pose_estimator.hpp"
@@ -47,6 +46,10 @@ std::array<Vector9, kFingers> natural_angles(test::RandomValues& random) {
   return q;
 }
 
+bool converged(FingerQuality quality) {
+  return quality == FingerQuality::kOptimal || quality == FingerQuality::kAtLimit;
+}
+
 Vector9 angles(const HandState& state, std::size_t finger) {
   return state.q_rad.segment<9>(static_cast<Eigen::Index>(kFingerOffset[finger]));
 }
@@ -78,7 +81,7 @@ TEST(FingerEstimator, RecoversTheMarkerPointsOfAnyNaturalPose) {
     estimator.step(scene.frame, scene.hand_pose, state);
     ASSERT_TRUE(state.valid);
     for (std::size_t f = 0; f < kFingers; ++f) {
-      ASSERT_EQ(state.quality[f], FingerQuality::kOptimal) << "pose " << i << " " << kFingerNames[f];
+      ASSERT_TRUE(converged(state.quality[f])) << "pose " << i << " " << kFingerNames[f];
       ASSERT_EQ(state.visible_markers[f], 2);
       ASSERT_LT(state.residual_m[f], 4e-3) << "pose " << i << " " << kFingerNames[f];
       double distance_m = 0.0;
@@ -101,36 +104,13 @@ TEST(FingerEstimator, AgreesWithSlsqpOnThePapersObjective) {
     HandState state;
     const Scene first = scene_of(model, q, random, 1e-3);
     estimator.step(first.frame, first.hand_pose, state);
-    const HandState before = state;
     for (Vector9& finger : q) finger += random.vector<9>(-.02, .02);
     const Scene scene = scene_of(model, q, random, 2e-3);
     estimator.step(scene.frame, scene.hand_pose, state);
     for (std::size_t f = 0; f < kFingers; ++f) {
       const auto cost = [&](const Vector9& x) { return objective(model, config, scene, f, x); };
-      using Cost = decltype(cost);
-      nlopt::opt reference(nlopt::LD_SLSQP, 9);
-      reference.set_lower_bounds(std::vector<double>(config.lower_rad[f].data(), config.lower_rad[f].data() + 9));
-      reference.set_upper_bounds(std::vector<double>(config.upper_rad[f].data(), config.upper_rad[f].data() + 9));
-      reference.set_min_objective(
-          [](unsigned, const double* x, double* gradient, void* data) {
-            const Cost& at = *static_cast<const Cost*>(data);
-            const Vector9 here = Eigen::Map<const Vector9>(x);
-            for (Eigen::Index k = 0; gradient != nullptr && k < 9; ++k) {
-              gradient[k] = 1e6 * (at(here + 1e-6 * Vector9::Unit(k)) - at(here - 1e-6 * Vector9::Unit(k))) / 2e-6;
-            }
-            return 1e6 * at(here);  // mm^2: SLSQP's internal tolerances are absolute
-          },
-          const_cast<void*>(static_cast<const void*>(&cost)));
-      reference.set_xtol_rel(1e-10);
-      reference.set_maxeval(2'000);
-      const Vector9 start = angles(before, f);
-      std::vector<double> x(start.data(), start.data() + 9);
-      double found = 0.0;
-      try {
-        (void)reference.optimize(x, found);
-      } catch (const nlopt::roundoff_limited&) {  // it went as far as it could
-      }
-      const double theirs = cost(Eigen::Map<const Vector9>(x.data()));
+      const Vector9 reference = solve_slsqp(estimator.problem(static_cast<Finger>(f)), 2'000, 1e-14).q_rad;
+      const double theirs = cost(reference);
       const double ours = cost(angles(state, f));
       ASSERT_NEAR(ours, theirs, 1e-3 * theirs) << "pose " << i << " " << kFingerNames[f];
     }
@@ -139,7 +119,8 @@ TEST(FingerEstimator, AgreesWithSlsqpOnThePapersObjective) {
 
 TEST(FingerEstimator, EndsAtAMinimumOfThePapersObjectiveInTheBox) {
   const HandModel model;
-  const FingerEstimatorConfig config;
+  FingerEstimatorConfig config = FingerEstimatorConfig::published();
+  config.max_iterations = 200;
   test::RandomValues random(53);
   for (int i = 0; i < 200; ++i) {
     const Scene scene = scene_of(model, natural_angles(random), random, 5e-3);
@@ -226,7 +207,9 @@ TEST(FingerEstimator, KeepsTheEndJointsWhileOnlyTheMiddleMarkerIsSeen) {
   const HandModel model;
   test::RandomValues random(57);
   auto q = natural_angles(random);
-  FingerEstimator estimator(model, paper_glove(), {});
+  FingerEstimatorConfig config;
+  config.trust_labels = true;  // the markers jump farther than a finger moves
+  FingerEstimator estimator(model, paper_glove(), config);
   HandState state;
   Scene scene = scene_of(model, q, random);
   estimator.step(scene.frame, scene.hand_pose, state);
@@ -234,9 +217,9 @@ TEST(FingerEstimator, KeepsTheEndJointsWhileOnlyTheMiddleMarkerIsSeen) {
   q[1](2) += 0.3;
   scene = scene_of(model, q, random);
   scene.frame.markers[5].visible = false;
-  estimator.step(scene.frame, scene.hand_pose, state);
+  for (int i = 0; i < 20; ++i) estimator.step(scene.frame, scene.hand_pose, state);
   EXPECT_EQ(state.visible_markers[1], 1);
-  EXPECT_EQ(state.quality[1], FingerQuality::kOptimal);
+  EXPECT_TRUE(converged(state.quality[1]));
   EXPECT_EQ(angles(state, 1).tail<6>(), before.tail<6>());
   EXPECT_NEAR(angles(state, 1)(2), before(2) + 0.3, 0.05);
   EXPECT_LT(state.residual_m[1], 1e-3);
@@ -313,12 +296,10 @@ TEST(FingerEstimator, ConvergesOnARealRecordingWithAResidualOfAFewMillimetres) {
   const auto frames = test::read_recording(EMBODY_SOURCE_DIR "/../shared/data/small_pillow.tsv", glove);
   if (frames.empty()) GTEST_SKIP() << "the real recording ../shared/data/small_pillow.tsv is not here";
   for (const Skeleton skeleton : {Skeleton::kBoneLengths, Skeleton::kWebXr}) {
-    HandModelConfig config;
-    config.skeleton = skeleton;
-    config.attachments = default_attachments(skeleton);
-    const HandModel model(config);
+    const HandData data = builtin_hand(skeleton, Side::kRight);
+    const HandModel model(data, Shape::Zero(), default_points(data));
     HandPoseEstimator hand(glove, paper_calibration());
-    FingerEstimator fingers(model, glove, {});
+    FingerEstimator fingers(model, glove, FingerEstimatorConfig::published());
     HandState state;
     std::array<double, kFingers> residual_m{};
     std::size_t solved = 0, optimal = 0;
@@ -328,7 +309,7 @@ TEST(FingerEstimator, ConvergesOnARealRecordingWithAResidualOfAFewMillimetres) {
         residual_m[f] += state.residual_m[f] / static_cast<double>(frames.size());
         if (state.quality[f] == FingerQuality::kHeld) continue;
         ++solved;
-        optimal += state.quality[f] == FingerQuality::kOptimal;
+        optimal += converged(state.quality[f]);
       }
     }
     EXPECT_GE(static_cast<double>(optimal), 0.995 * static_cast<double>(solved));

@@ -134,6 +134,59 @@ TEST(HandPoseEstimator, IsNotValidForFramesThatAreShorterThanTheGlove) {
   EXPECT_FALSE(HandPoseEstimator(absurd, paper_calibration()).step(frame).valid);
 }
 
+GloveLayout glove_with_edges() {
+  GloveLayout glove = paper_glove();
+  const MarkerFrame frame = test::first_real_frame();
+  const auto edge = [&](std::size_t i, std::size_t j) { return (frame.markers[i].p_W - frame.markers[j].p_W).norm(); };
+  glove.back_edges_m = {edge(0, 1), edge(0, 2), edge(1, 2)};
+  return glove;
+}
+
+TEST(HandPoseEstimator, SaysHowFarTheTriadIsFromItsKnownShape) {
+  HandPoseEstimator estimator(glove_with_edges(), paper_calibration());
+  MarkerFrame frame = test::first_real_frame();
+  EXPECT_LT(estimator.step(frame).fit_error_m, 1e-9);
+  frame.markers[0].p_W += .002 * (frame.markers[0].p_W - frame.markers[2].p_W).normalized();
+  const HandPose pose = estimator.step(frame);
+  EXPECT_TRUE(pose.valid);
+  EXPECT_GT(pose.fit_error_m, .001);
+  EXPECT_LT(pose.fit_error_m, .002);
+  EXPECT_EQ(HandPoseEstimator(paper_glove(), paper_calibration()).step(frame).fit_error_m, 0.0) << "still learning";
+}
+
+TEST(HandPoseEstimator, MakesTheSamePoseFromExchangedLabels) {
+  const MarkerFrame good = test::first_real_frame();
+  HandPoseEstimator estimator(glove_with_edges(), paper_calibration());
+  const HandPose expected = estimator.step(good);
+  for (const auto& [a, b] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}}) {
+    MarkerFrame frame = good;
+    std::swap(frame.markers[static_cast<std::size_t>(a)], frame.markers[static_cast<std::size_t>(b)]);
+    const HandPose pose = estimator.step(frame);
+    EXPECT_TRUE(pose.valid);
+    EXPECT_EQ(estimator.triad().state(), TriadState::kRelabelled);
+    EXPECT_EQ(pose.X_WM.matrix(), expected.X_WM.matrix()) << a << " and " << b;
+  }
+}
+
+TEST(HandPoseEstimator, KeepsTheLastPoseWhenTheTriadIsNotTheKnownOne) {
+  const MarkerFrame good = test::first_real_frame();
+  HandPoseEstimator estimator(glove_with_edges(), paper_calibration());
+  const HandPose before = estimator.step(good);
+  MarkerFrame frame = good;
+  frame.markers[1].p_W.y() += .02;
+  for (int i = 1; i <= 150; ++i) {
+    const HandPose pose = estimator.step(frame);
+    ASSERT_FALSE(pose.valid);
+    ASSERT_EQ(pose.X_WM.matrix(), before.X_WM.matrix());
+    ASSERT_GT(pose.fit_error_m, .004);
+    ASSERT_EQ(estimator.triad().state(), i < 100 ? TriadState::kWrong : TriadState::kChanged);
+  }
+  EXPECT_TRUE(estimator.step(good).valid);
+  frame.markers[1].visible = false;
+  EXPECT_FALSE(estimator.step(frame).valid);
+  EXPECT_EQ(estimator.triad().state(), TriadState::kMissing);
+}
+
 TEST(HandPoseEstimator, DoesNotTouchTheHeap) {
   const MarkerFrame frame = test::first_real_frame();
   HandPoseEstimator estimator(paper_glove(), paper_calibration());

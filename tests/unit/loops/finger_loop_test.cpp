@@ -28,7 +28,7 @@ Models shipped_models() {
 class FingerBench {
  public:
   explicit FingerBench(const SlowDown& slow_down = {})
-      : models(shipped_models()), loop(models.fingers, models.embodiment, slow_down, edges) {}
+      : models(shipped_models()), loop(models.fingers, models.filter, models.embodiment, slow_down, edges) {}
 
   void publish(std::size_t k) {
     TrackedFrame tracked;
@@ -67,6 +67,60 @@ TEST(FingerLoop, TurnsEachFrameIntoAFingerTarget) {
   bench.edges.stop = true;
   EXPECT_EQ(thread.join(), 0U) << "heap uses";
   EXPECT_EQ(bench.edges.counters.finger_skipped, 0U);
+}
+
+TEST(FingerLoop, ReportsWhatBecameOfEachMarkerAndCountsItOverAllFrames) {
+  FingerBench bench;
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
+  constexpr std::size_t kFrames = 30;
+  std::array<std::uint32_t, kMaxMarkers> seen{};
+  for (std::size_t k = 0; k < kFrames; ++k) {
+    const MarkerFrame frame = bench.motion.frame(k).markers;
+    for (std::size_t slot = 0; slot < frame.count; ++slot) seen[slot] += frame.markers[slot].visible ? 1 : 0;
+    bench.publish(k);
+    ASSERT_TRUE(eventually([&] { return bench.used() == k + 1; })) << "frame " << k;
+  }
+  bench.edges.stop = true;
+  EXPECT_EQ(thread.join(), 0U) << "heap uses";
+  ASSERT_TRUE(bench.edges.fingers_to_telemetry.update());
+  const FingerReport& report = bench.edges.fingers_to_telemetry.get();
+  EXPECT_EQ(report.tally.frames, kFrames);
+  EXPECT_EQ(report.tally.seen, seen);
+  EXPECT_EQ(report.tracked.frame.frame_number, report.state.frame_number);
+  for (const hand::FingerMarker& marker : bench.models.glove.finger_markers) {
+    std::uint32_t all = 0;
+    for (const std::uint32_t n : report.tally.verdicts[marker.slot]) all += n;
+    EXPECT_EQ(all, kFrames) << "each frame has one verdict";
+    EXPECT_EQ(report.tally.verdicts[marker.slot][static_cast<std::size_t>(hand::MarkerVerdict::kNone)], 0U);
+  }
+}
+
+TEST(FingerLoop, SaysHowSureTheTargetIsAndTheBackOfTheHandCountsForAllOfIt) {
+  FingerBench bench;
+  test::WatchedThread thread(bench.edges.stop, [&] { bench.loop.run(); });
+  const auto target_of = [&](bool checked, bool valid, double fit_error_m) {
+    TrackedFrame tracked;
+    tracked.frame = bench.motion.frame(bench.sequence).markers;
+    tracked.pose = bench.models.hand_pose.step(tracked.frame);
+    tracked.pose.valid = valid;
+    tracked.pose.fit_error_m = fit_error_m;
+    tracked.back.checked = checked;
+    tracked.sequence = ++bench.sequence;
+    bench.edges.frame_to_fingers.publish(tracked);
+    bench.edges.fingers_wake.notify();
+    EXPECT_TRUE(eventually([&] { return bench.used() == bench.sequence; }));
+    bench.edges.target_to_hand.update();
+    return bench.edges.target_to_hand.get();
+  };
+  EXPECT_EQ(target_of(true, true, 0.0).hand_confidence, 1.0);
+  EXPECT_LT(target_of(true, true, 0.004).hand_confidence, 0.5);
+  EXPECT_EQ(target_of(true, false, 0.0).hand_confidence, 0.0);
+  EXPECT_EQ(target_of(false, true, 0.01).hand_confidence, 1.0) << "the sensor has judged its pose itself";
+  EXPECT_EQ(target_of(false, false, 0.0).hand_confidence, 0.0);
+  const FingerTarget good = target_of(true, true, 0.0);
+  for (std::size_t i = 0; i < good.joint_count; ++i) EXPECT_GT(good.joint_confidence[i], 0.3) << "joint " << i;
+  bench.edges.stop = true;
+  EXPECT_EQ(thread.join(), 0U) << "heap uses";
 }
 
 TEST(FingerLoop, TakesTheNewestFrameAndCountsTheOnesItPassesOver) {

@@ -145,6 +145,18 @@ TEST(HandLoop, HoldsBeforeAnyModeIsKnown) {
   }
 }
 
+TEST(HandLoop, ReportsWhyTheHandHolds) {
+  HandBench bench;
+  bench.publish(Mode::kAligned, now());
+  bench.publish_target(0.5);
+  bench.script = [&](std::uint64_t n) {
+    if (n == 20) bench.edges.stop = true;
+  };
+  bench.run();
+  ASSERT_TRUE(bench.edges.hand_to_telemetry.update());
+  EXPECT_EQ(bench.edges.hand_to_telemetry.get().hold, safety::HandHold::kMode);
+}
+
 TEST(HandLoop, GivesALostHandBackAndSaysThatItIsNotReady) {
   for (const bool on_write : {false, true}) {
     HandBench bench;

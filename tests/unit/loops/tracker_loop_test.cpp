@@ -12,8 +12,10 @@ using transport::now;
 /// A tracker loop over a fake tracker with the paper's glove.
 class TrackerBench {
  public:
-  TrackerBench()
-      : baton(tracker), loop(baton, hand::HandPoseEstimator(hand::paper_glove(), hand::paper_calibration()), edges) {
+  explicit TrackerBench(const teleop::PosePredictorConfig& predictor = {})
+      : baton(tracker),
+        loop(baton, hand::HandPoseEstimator(hand::paper_glove(), hand::paper_calibration()),
+             teleop::PosePredictor(predictor), edges) {
     tracker.fd = ready.get();
   }
   /// Frame with the three markers on the back of a hand that moves slowly.
@@ -69,6 +71,34 @@ TEST(TrackerLoop, UsesEveryBufferedFrameOnceAndPublishesTheNewest) {
   EXPECT_EQ(bench.edges.frame_to_fingers.get().sequence, kFrames);
   EXPECT_EQ(bench.edges.frame_to_fingers.get().frame.frame_number, kFrames);
   EXPECT_TRUE(wait_for_input(bench.edges.fingers_wake.fd(), -1, Duration{0})) << "the finger loop was woken";
+}
+
+TEST(TrackerLoop, PredictsThePoseOfTheArmAndLeavesThatOfTheFingersAsMeasured) {
+  teleop::PosePredictorConfig predictor;
+  predictor.ahead = std::chrono::milliseconds(50);
+  TrackerBench bench(predictor);
+  std::uint64_t number = 0;
+  const TimePoint start = now();
+  bench.tracker.on_read = [&](MarkerFrame& frame) {
+    if (number == 300) {
+      bench.edges.stop = true;
+      return IoStatus::kEmpty;
+    }
+    ++number;
+    TrackerBench::fill(frame, 100 * number, start + number * std::chrono::milliseconds(10));  // 0.1 m/s
+    return IoStatus::kDone;
+  };
+  EXPECT_EQ(bench.run(), 0U) << "heap uses";
+  ASSERT_TRUE(bench.edges.pose_to_arm.update());
+  ASSERT_TRUE(bench.edges.frame_to_fingers.update());
+  const HandPose& arm = bench.edges.pose_to_arm.get();
+  const HandPose& fingers = bench.edges.frame_to_fingers.get().pose;
+  const Eigen::Vector3d ahead_m = arm.X_WM.translation() - fingers.X_WM.translation();
+  EXPECT_LT((ahead_m - Eigen::Vector3d(0.005, 0.0, 0.0)).norm(), 1e-6);
+  EXPECT_TRUE(arm.valid);
+  EXPECT_EQ(arm.streak, fingers.streak);
+  EXPECT_EQ(arm.sequence, fingers.sequence);
+  EXPECT_EQ(arm.t_capture, fingers.t_capture);
 }
 
 TEST(TrackerLoop, CountsFramesWithoutAHandAndMarksTheirPose) {

@@ -288,6 +288,77 @@ TEST(QtmServer, HidesAMarkerUntilItIsShownAgain) {
   EXPECT_TRUE(eventually([&] { return next_data().markers[0].visible; }));
 }
 
+/// A client that reads a stream, and what the recording says of each frame.
+class StreamedLab {
+ public:
+  explicit StreamedLab(recording::Recording r) : recording(std::move(r)), lab(recording), connection(lab.connect()) {
+    EXPECT_TRUE(connection.send("StreamFrames AllFrames 3D", soon()).ok());
+    EXPECT_TRUE(eventually([&] { return lab.server.has_streaming_client(); }));
+  }
+  DataPacket next() {
+    DataPacket data;
+    Bytes packet = next_packet(connection);
+    while (!packet.empty() && type_of(packet) != PacketType::kData) packet = next_packet(connection);
+    EXPECT_TRUE(qualisys::decode_data(packet, data).ok());
+    return data;
+  }
+  const Marker& recorded(const DataPacket& data, std::size_t marker) const {
+    return recording.frames[data.frame_number - 1][marker];
+  }
+
+  recording::Recording recording;
+  Lab lab;
+  RtConnection connection;
+};
+
+TEST(QtmServer, SwappedLabelsFollowEachOthersMarkerUntilSwappedAgain) {
+  StreamedLab streamed(small_recording(20'000, 2'000.0));
+  QtmServer& server = streamed.lab.server;
+  EXPECT_FALSE(server.swap_labels("a", "nobody"));
+  ASSERT_TRUE(server.swap_labels(kLabels[0], kLabels[1]));
+  server.play();
+  const auto same = [](const Marker& x, const Marker& y) {
+    return x.visible == y.visible && (!x.visible || x.p_W.isApprox(y.p_W, 1e-6));
+  };
+  for (int i = 0; i < 20; ++i) {
+    const DataPacket data = streamed.next();
+    EXPECT_TRUE(same(data.markers[0], streamed.recorded(data, 1)));
+    EXPECT_TRUE(same(data.markers[1], streamed.recorded(data, 0)));
+    EXPECT_TRUE(same(data.markers[2], streamed.recorded(data, 2)));
+  }
+  ASSERT_TRUE(server.swap_labels(kLabels[1], kLabels[0]));
+  EXPECT_TRUE(eventually([&] {
+    const DataPacket data = streamed.next();
+    return data.markers[0].visible && same(data.markers[0], streamed.recorded(data, 0));
+  }));
+}
+
+TEST(QtmServer, AGhostStandsStillNearWhereTheMarkerWas) {
+  StreamedLab streamed(small_recording(20'000, 2'000.0));
+  QtmServer& server = streamed.lab.server;
+  EXPECT_FALSE(server.set_ghost("nobody", true));
+  ASSERT_TRUE(server.set_ghost("a", true));
+  server.play();
+  std::optional<Eigen::Vector3d> p_W;
+  for (int i = 0; i < 30; ++i) {
+    const DataPacket data = streamed.next();
+    const Marker& ghost = data.markers[0];
+    if (!p_W && !ghost.visible) continue;  // the marker itself is missing in the first frames
+    ASSERT_TRUE(ghost.visible) << "a reflection does not go with the marker";
+    if (!p_W) {
+      p_W = ghost.p_W;
+      EXPECT_NEAR((*p_W - streamed.recorded(data, 0).p_W).norm(), 0.1, 1e-4);
+    }
+    EXPECT_EQ(ghost.p_W, *p_W);
+  }
+  ASSERT_TRUE(p_W.has_value());
+  ASSERT_TRUE(server.set_ghost("a", false));
+  EXPECT_TRUE(eventually([&] {
+    const DataPacket data = streamed.next();
+    return data.markers[0].visible && data.markers[0].p_W.isApprox(streamed.recorded(data, 0).p_W, 1e-6);
+  }));
+}
+
 TEST(QtmServer, DropsAClientThatDoesNotReadAndGoesOnServingTheOthers) {
   std::vector<std::string> names;
   for (int i = 0; i < 250; ++i) names.push_back("m" + std::to_string(i));

@@ -152,6 +152,87 @@ TEST(HandGate, StartsAfreshFromTheMeasuredAnglesAfterEveryInterruption) {
   }
 }
 
+HandGateConfig careful() {
+  HandGateConfig config;
+  config.min_confidence = 0.2;
+  return config;
+}
+
+TEST(HandGate, AJointThatIsNotSureKeepsItsLastTargetWhileTheOthersGoOn) {
+  for (const double unsure : {0.0, 0.199, kNan}) {
+    HandGate gate(careful());
+    Moment moment;
+    moment.target.hand_confidence = 1.0;
+    moment.target.joint_confidence.fill(1.0);
+    moment.target.q_rad = {0.5, 0.5, 0.5};
+    HandCommand command = moment.step(gate);
+    EXPECT_EQ(gate.kept_joints(), 0U);
+    moment.target.joint_confidence[1] = unsure;
+    moment.target.q_rad = {1.0, 1.0, 1.0};
+    for (int cycle = 0; cycle < 40; ++cycle) {
+      moment.advance(milliseconds(50));
+      command = moment.step(gate);
+      ASSERT_EQ(command.action, HandAction::kMove);
+      ASSERT_EQ(gate.kept_joints(), 2U) << "bit of joint 1";
+    }
+    EXPECT_DOUBLE_EQ(command.q_rad[0], 1.0);
+    EXPECT_DOUBLE_EQ(command.q_rad[1], 0.5) << "confidence " << unsure;
+    EXPECT_DOUBLE_EQ(command.q_rad[2], 1.0);
+    moment.target.joint_confidence[1] = 0.2;
+    for (int cycle = 0; cycle < 40; ++cycle) {
+      moment.advance(milliseconds(50));
+      command = moment.step(gate);
+    }
+    EXPECT_DOUBLE_EQ(command.q_rad[1], 1.0) << "sure again, it catches up";
+    EXPECT_EQ(gate.kept_joints(), 0U);
+  }
+}
+
+TEST(HandGate, AJointThatWasNeverSureStaysWhereItIs) {
+  HandGate gate(careful());
+  Moment moment;
+  moment.measured.q_rad = {0.3, 0.4, 0.5};
+  moment.target.hand_confidence = 1.0;
+  moment.target.q_rad = {1.0, 1.0, 1.0};
+  for (int cycle = 0; cycle < 10; ++cycle) {
+    moment.advance(milliseconds(50));
+    const HandCommand command = moment.step(gate);
+    for (std::size_t i = 0; i < kJoints; ++i) ASSERT_DOUBLE_EQ(command.q_rad[i], moment.measured.q_rad[i]);
+  }
+}
+
+TEST(HandGate, HoldsTheWholeHandWhileItIsNotSureAndSaysWhy) {
+  for (const double unsure : {0.0, 0.199, kNan}) {
+    HandGate gate(careful());
+    Moment moment;
+    moment.target.joint_confidence.fill(1.0);
+    moment.target.hand_confidence = unsure;
+    EXPECT_EQ(moment.step(gate).action, HandAction::kHold);
+    EXPECT_EQ(gate.hold(), HandHold::kUnsure);
+    EXPECT_NE(std::string(to_string(gate.hold())).find("min_hand_confidence"), std::string::npos);
+    moment.target.hand_confidence = 0.2;
+    EXPECT_EQ(moment.step(gate).action, HandAction::kMove);
+    EXPECT_EQ(gate.hold(), HandHold::kNone);
+  }
+}
+
+TEST(HandGate, EachReasonToHoldHasItsName) {
+  const auto reason_after = [](auto&& change) {
+    HandGate gate({});
+    Moment moment;
+    change(moment);
+    (void)moment.step(gate);
+    return gate.hold();
+  };
+  EXPECT_EQ(reason_after([](Moment&) {}), HandHold::kNone);
+  EXPECT_EQ(reason_after([](Moment& m) { m.mode.t -= milliseconds(101); }), HandHold::kModeStale);
+  EXPECT_EQ(reason_after([](Moment& m) { m.mode.mode = Mode::kAligned; }), HandHold::kMode);
+  EXPECT_EQ(reason_after([](Moment& m) { m.measured.reply = 0; }), HandHold::kNoAnswer);
+  EXPECT_EQ(reason_after([](Moment& m) { m.measured.q_rad[2] = kNan; }), HandHold::kNoAnswer);
+  EXPECT_EQ(reason_after([](Moment& m) { m.target.valid = false; }), HandHold::kNotSeen);
+  EXPECT_EQ(reason_after([](Moment& m) { m.target.t_capture -= milliseconds(501); }), HandHold::kTargetStale);
+}
+
 TEST(HandGate, NeverCommandsAnAngleThatIsNotFinite) {
   HandGate gate({});
   Moment moment;

@@ -35,7 +35,7 @@ std::vector<Sample> hand_poses(const recording::Recording& recording, const Mode
     const auto& names = recording.marker_names;
     columns.push_back(static_cast<std::size_t>(std::find(names.begin(), names.end(), name.view()) - names.begin()));
   }
-  hand::HandPoseEstimator estimator = models.hand_pose;
+  hand::PoseEstimator estimator = models.hand_pose;
   PoseMonitor monitor;
   std::vector<Sample> samples;
   for (std::size_t k = 0; k < recording.frames.size(); ++k) {
