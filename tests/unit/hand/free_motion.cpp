@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "core/hand/calibration_prior.hpp"
 
@@ -153,22 +154,27 @@ FreeMotion free_motion(const HandData& data, const GloveLayout& glove, const Han
 
 void CalibrationErrors::add(const HandData& data, const FreeMotion& truth, const Calibration& found,
                             const CalibrationPrior& prior) {
-  const auto count = [this](double error, double sd, bool only_prior) {
-    if (only_prior) {
-      ++prior_only;
-      return;
+  const auto count = [this](const char* name, double error, double sd, bool only_prior) {
+    Group& group = groups[name];
+    const bool hit = std::abs(error) <= 2.0 * sd;
+    for (auto& [all, in, unknown] :
+         {std::tie(known, inside, prior_only), std::tie(group.known, group.inside, group.prior_only)}) {
+      all += only_prior ? 0 : 1;
+      in += !only_prior && hit ? 1 : 0;
+      unknown += only_prior ? 1 : 0;
     }
-    ++known;
-    inside += std::abs(error) <= 2.0 * sd ? 1 : 0;
   };
+  constexpr std::array<const char*, 10> kShapeNames{"scale",  "breadth", "palm length", "thumb", "index",
+                                                    "middle", "ring",    "little",      "girth", "distal"};
   for (Index i = 0; i < truth.shape.size(); ++i) {
-    count(found.shape(i) - truth.shape(i), found.shape_sd(i), found.shape_prior_only[static_cast<std::size_t>(i)]);
+    const auto k = static_cast<std::size_t>(i);
+    count(kShapeNames[k], found.shape(i) - truth.shape(i), found.shape_sd(i), found.shape_prior_only[k]);
   }
   const Pose off = truth.X_HM.inverse() * found.X_HM;
   const Vector3d turned = math::log_so3(off.linear());
   for (Index i = 0; i < 3; ++i) {
-    count(turned(i), found.X_HM_sd(i), false);
-    count(off.translation()(i), found.X_HM_sd(3 + i), false);
+    count("X_HM turn", turned(i), found.X_HM_sd(i), false);
+    count("X_HM place", off.translation()(i), found.X_HM_sd(3 + i), false);
   }
   const HandModel true_hand(data, truth.shape, truth.points), found_hand(data, found.shape, truth.points);
   for (const CalibratedMarker& marker : found.markers) {
@@ -176,7 +182,8 @@ void CalibrationErrors::add(const HandData& data, const FreeMotion& truth, const
     const std::size_t point = (marker.slot - 3) % 2;
     const Vector3d& place = truth.points[f][point].offset_m;
     for (Index i = 0; i < 3; ++i) {
-      count(marker.offset_m(i) - place(i), marker.sd_m(i), marker.sd_m(i) > 0.9 * prior.marker_sd_m);
+      count(point == 0 ? "tip marker" : "mid marker", marker.offset_m(i) - place(i), marker.sd_m(i),
+            marker.sd_m(i) > 0.9 * prior.marker_sd_m);
     }
     distance_m.push_back(std::abs(marker.offset_m.norm() - place.norm()));
     if (point != 0) continue;

@@ -1,6 +1,8 @@
 #pragma once
 // Ten seconds of a made-up person's free finger motion in a made-up glove, with the truth: what the calibration has to
 // find out.
+#include <map>
+#include <string>
 #include <vector>
 
 #include "core/hand/calibration.hpp"
@@ -39,6 +41,10 @@ struct CalibrationErrors {
   std::size_t known{0};            ///< numbers (shape, X_HM, places) that the motion says something about,
   std::size_t inside{0};           ///< of those: with the truth within two stated standard deviations
   std::size_t prior_only{0};       ///< numbers that only the prior knows
+  struct Group {
+    std::size_t known{0}, inside{0}, prior_only{0};
+  };
+  std::map<std::string, Group> groups;  ///< the same by kind of number
 
   void add(const hand::HandData& data, const FreeMotion& truth, const hand::Calibration& found,
            const hand::CalibrationPrior& prior);
