@@ -160,14 +160,21 @@ void EmbodimentMapping::step(const HandState& state, FingerTarget& target) noexc
   target.joint_count = motors_.size();
   target.residual_m.fill(0.0);
   target.valid = state.valid;
-  target.joint_confidence.fill(1.0);  // of a motor that follows no finger
-  std::array<bool, kMaxHandJoints> follows{};
+  std::array<bool, kFingers> follows{};  // a finger without any estimate takes no part
+  std::array<bool, kMaxHandJoints> followed{}, moved{};
+  target.joint_confidence.fill(1.0);  // of a motor that moves no finger
   for (std::size_t finger = 0; finger < kFingers; ++finger) {
     const std::size_t motor = circles_[finger][0].motor;
     if (motor == kNoIndex) continue;
-    double& confidence = target.joint_confidence[motor];
-    confidence =
-        std::exchange(follows[motor], true) ? std::min(confidence, state.confidence[finger]) : state.confidence[finger];
+    follows[finger] = state.quality[finger] != FingerQuality::kNone;
+    moved[motor] = true;
+    if (!follows[finger]) continue;
+    followed[motor] = true;
+    const double confidence = std::isfinite(state.confidence[finger]) ? state.confidence[finger] : 0.0;
+    target.joint_confidence[motor] = std::min(target.joint_confidence[motor], confidence);
+  }
+  for (std::size_t m = 0; m < motors_.size(); ++m) {
+    if (moved[m] && !followed[m]) target.joint_confidence[m] = 0.0;
   }
   // Per motor: cost = const - 2 (U cos(k r) + V sin(k r)), summed over the points that the motor moves.
   std::array<double, kMaxHandJoints> U{}, V{};
@@ -175,7 +182,7 @@ void EmbodimentMapping::step(const HandState& state, FingerTarget& target) noexc
   for (std::size_t finger = 0; finger < kFingers; ++finger) {
     for (std::size_t i = 0; i < 2; ++i) {
       const Circle& circle = circles_[finger][i];
-      if (circle.motor == kNoIndex) continue;
+      if (!follows[finger]) continue;
       p_P[finger][i] = X_PM_ * state.p_M[finger][i];
       const Eigen::Vector3d s = p_P[finger][i] - circle.centre;
       U[circle.motor] += s.dot(circle.u);
@@ -186,6 +193,7 @@ void EmbodimentMapping::step(const HandState& state, FingerTarget& target) noexc
     target.valid = target.valid && std::isfinite(U[m]) && std::isfinite(V[m]);
   }
   for (std::size_t m = 0; target.valid && m < motors_.size(); ++m) {
+    if (moved[m] && !followed[m]) continue;  // keeps its angle
     const Motor& motor = motors_[m];
     last_rad_[m] = best_angle(U[m], V[m], motor.ratio, motor.lower_rad, motor.upper_rad, last_rad_[m]);
   }
@@ -193,7 +201,7 @@ void EmbodimentMapping::step(const HandState& state, FingerTarget& target) noexc
   if (!target.valid) return;
   const auto g_P = finger_points(last_rad_);
   for (std::size_t finger = 0; finger < kFingers; ++finger) {
-    if (circles_[finger][0].motor == kNoIndex) continue;
+    if (!follows[finger]) continue;
     const double sum_m2 =
         (p_P[finger][0] - g_P[finger][0]).squaredNorm() + (p_P[finger][1] - g_P[finger][1]).squaredNorm();
     target.residual_m[finger] = std::sqrt(sum_m2 / 2.0);

@@ -34,7 +34,8 @@ class EmbodimentMapping {
 
   /// One mapping. Copies frame number and times (t_solved and hand_confidence are the caller's). The target is invalid
   /// when the state is invalid or not finite; it then repeats the last valid angles. A joint is as sure as the least
-  /// sure finger that it follows.
+  /// sure finger that it follows; fingers without an estimate (kNone: no marker, or none seen yet) are not followed,
+  /// and a motor that has only such fingers keeps its angle with confidence 0.
   void step(const HandState& state, FingerTarget& target) noexcept;
 
   [[nodiscard]] const Pose& X_PM() const noexcept { return X_PM_; }

@@ -93,7 +93,7 @@ struct HandState {
   std::array<std::uint8_t, kFingers> visible_markers{};
   std::array<FingerQuality, kFingers> quality{};
   std::array<double, kFingers> confidence{};  ///< 0 (nothing known) .. 1 (all markers seen and explained)
-  double hand_confidence{0.0};                ///< the least of back of the hand and fingers that are measured
+  double hand_confidence{0.0};                ///< the least of the back of the hand and the fingers with markers
   bool valid{false};
 };
 
@@ -124,7 +124,7 @@ enum class ArmCondition : std::uint8_t {
 
 /// What the arm's controller said in one package.
 struct ArmState {
-  std::uint64_t package{0};  ///< counts packages of this session
+  std::uint64_t package{0};  ///< counts packages of this connection
   Duration controller_time{0};
   TimePoint t_arrival{};
   Vector6 q_rad{Vector6::Zero()};
@@ -155,7 +155,7 @@ struct ArmCommand {
 };
 
 struct HandDeviceState {
-  std::uint64_t reply{0};  ///< counts position replies of this session
+  std::uint64_t reply{0};  ///< counts position replies of this connection
   TimePoint t_arrival{};
   std::size_t joint_count{0};
   std::array<double, kMaxHandJoints> q_rad{};

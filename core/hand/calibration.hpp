@@ -17,7 +17,7 @@ struct CalibrationPrior {
   double X_HM_rotation_sd_rad{0.3};
   /// Least error of a measured marker, per axis: sensor, skin that moves over the bones, and joints that are not quite
   /// the model's. The real one is estimated from the residuals, but never below this.
-  double noise_sd_m{0.002};
+  double noise_sd_m{0.001};
 };
 
 struct CalibrationOptions {
@@ -53,20 +53,21 @@ struct Calibration {
 /// Estimates shape, marker places and X_HM together: maximum a posteriori over selected frames, finger angles and the
 /// error of each frame's hand pose integrated out (Laplace), robust to drop-outs, swaps and ghosts; docs/calibration.md
 /// has the method and its measured accuracy. `points` and `X_HM` are the nominal values (prior means); `data` is the
-/// hand at zero shape. The stated standard deviations are simulation-tested: the truth is within two of them in 90 % of
-/// cases or more. Errors: kInvalidArgument (too few usable frames: says how many and why; a layout without finger
-/// markers; points, X_HM or prior that cannot be). Two to five seconds on one core for ten seconds of motion.
+/// hand at zero shape. Of simulated hands the truth was within two stated standard deviations for 95 % of
+/// the numbers (docs/calibration.md). Errors: kInvalidArgument (too few usable frames: says
+/// how many and why; a layout without finger markers; points, X_HM or prior that cannot be). Two to five seconds on one
+/// core for ten seconds of motion.
 [[nodiscard]] Result<Calibration> calibrate(const std::vector<MarkerFrame>& frames, const GloveLayout& glove,
                                             const HandData& data, const HandPoints& points, const Pose& X_HM,
                                             const CalibrationOptions& options = {});
 
-/// The layout and points with which the estimators use a calibration: each marker gets a kBone point of its own, behind
-/// the given points, which stay. Markers that the calibration does not know keep their point.
+/// The layout and points with which the estimators use a calibration: each marker gets a kBone point of its own, in
+/// place of the one that it has (index 2 on) or behind the given points: tip and middle, [0] and [1], stay. Markers
+/// that the calibration does not know keep their point.
 struct CalibratedGlove {
   GloveLayout glove;
   HandPoints points;
 };
-[[nodiscard]] CalibratedGlove apply(const Calibration& calibration, const GloveLayout& glove, const HandData& data,
-                                    const HandPoints& points);
+[[nodiscard]] CalibratedGlove apply(const Calibration& calibration, const GloveLayout& glove, const HandPoints& points);
 
 }  // namespace embody::hand

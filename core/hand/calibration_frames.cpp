@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/hand/hand_pose_estimator.hpp"
+#include "core/hand/triad_check.hpp"
 
 namespace embody::hand {
 namespace {
@@ -25,8 +26,6 @@ std::optional<Vector3d> seen(const MarkerFrame& frame, std::size_t slot) {
   return frame.markers[slot].p_W;
 }
 
-using Triad = std::array<Vector3d, 3>;  // top, left, right
-
 std::optional<Triad> triad(const MarkerFrame& frame, const GloveLayout& glove) {
   Triad p_W;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -39,12 +38,8 @@ std::optional<Triad> triad(const MarkerFrame& frame, const GloveLayout& glove) {
   return p_W;
 }
 
-std::array<double, 3> edges(const Triad& p) {
-  return {(p[0] - p[1]).norm(), (p[0] - p[2]).norm(), (p[1] - p[2]).norm()};
-}
-
 /// The triangle of the given edges in its frame H.
-Triad triad_in_H(const std::array<double, 3>& edge) {
+Triad triad_in_H(const TriadEdges& edge) {
   const auto [top_left, top_right, left_right] = edge;
   const double z =
       (top_right * top_right + left_right * left_right - top_left * top_left) / (2.0 * std::max(top_right, 1e-9));
@@ -74,7 +69,7 @@ Result<CalibrationFrames> gather_frames(const std::vector<MarkerFrame>& frames, 
   for (const MarkerFrame& frame : frames) {
     const auto p_W = triad(frame, glove);
     if (!p_W) continue;
-    const auto e = edges(*p_W);
+    const TriadEdges e = edges_of(*p_W);
     for (std::size_t i = 0; i < 3; ++i) lengths[i].push_back(e[i]);
   }
   constexpr std::size_t kFewest = 20;

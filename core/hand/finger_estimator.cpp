@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace embody::hand {
 namespace {
@@ -9,11 +10,14 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector3d;
 
+constexpr Index kMiddleFlexion = 5;  // about z of the finger's second joint
 constexpr double kPi = 3.14159265358979323846;
 constexpr Duration kUsualStep = std::chrono::milliseconds(10);
+constexpr int kTrialIterations = 10;  // from the present posture; more would not change a verdict of centimetres
+constexpr Duration kLongest = std::chrono::hours(1);
 constexpr int kReferenceEvaluations = 2000;
 constexpr double kReferenceTolerance = 1e-14;
-constexpr Duration kLongestStep = std::chrono::milliseconds(100);
+constexpr Duration kLongestStep = std::chrono::milliseconds(100);  // in which fingers catch up
 
 Vector9 angles(double x1, double y1, double z1, double x2, double y2, double z2, double x3, double y3, double z3) {
   Vector9 w;
@@ -78,6 +82,7 @@ FingerEstimator::FingerEstimator(const HandModel& model, const GloveLayout& glov
     problem.coupling_m_rad = f == 0 ? 0.0 : config_.coupling_m_rad;  // the thumb's last two joints are not coupled
     problem.coupling_ratio = config_.coupling_ratio;
     memory_[f].q_rad = Vector9::Zero().cwiseMax(config_.lower_rad[f]).cwiseMin(config_.upper_rad[f]);
+    memory_[f].chain = model_.chain(problem.finger, memory_[f].q_rad);
   }
   for (const FingerMarker& marker : glove_.finger_markers) ++carried_[static_cast<std::size_t>(marker.finger)];
 }
@@ -95,6 +100,7 @@ void FingerEstimator::step(const MarkerFrame& frame, const HandPose& hand_pose, 
     guard_.step(frame, hand_pose, checked_);
   }
   gather(frame);
+  unfold_iterations_ = 0;
   for (std::size_t f = 0; f < kFingers; ++f) {
     FingerProblem& problem = problems_[f];
     if (!hand_pose.valid) problem.markers.clear();
@@ -104,18 +110,27 @@ void FingerEstimator::step(const MarkerFrame& frame, const HandPose& hand_pose, 
     } else {
       prepare(f, dt);
       solve(f, state);
-      if (state.quality[f] == FingerQuality::kHeld) hold(f, dt, state);
+      if (state.quality[f] == FingerQuality::kHeld) {  // not solvable
+        problem.markers.clear();
+        hold(f, dt, state);
+      }
     }
   }
   if (hand_pose.valid) explain();
+  if (hand_pose.valid && !config_.trust_labels && guard_.trial()) {
+    answer(*guard_.trial());
+  } else {  // at most one solve besides the five
+    unfold();
+  }
   rate(hand_pose, state);
 }
 
-/// Time since the last frame, kept within reason: clocks may stand or jump.
+/// Time since the last frame; clocks may stand or run backwards.
 Duration FingerEstimator::step_time(TimePoint t_capture) noexcept {
-  const Duration dt = t_last_ == TimePoint{} ? kUsualStep : t_capture - t_last_;
+  const bool running = t_last_ != TimePoint{} && t_capture > t_last_;
+  const Duration dt = running ? t_capture - t_last_ : kUsualStep;
   t_last_ = t_capture;
-  return dt <= Duration{0} ? kUsualStep : std::min(dt, kLongestStep);
+  return dt;
 }
 
 /// Every visible marker is what its label says.
@@ -140,7 +155,7 @@ void FingerEstimator::gather(const MarkerFrame& frame) noexcept {
     if (marker.slot >= kMaxMarkers || marker.point >= model_.point_count(marker.finger)) continue;
     if (!checked_.usable(marker.slot)) continue;
     const double weight = frame.markers[checked_.source[marker.slot]].confidence;
-    if (!(weight > 0.0)) continue;
+    if (!(weight > 0.0 && weight >= config_.least_confidence)) continue;
     const auto f = static_cast<std::size_t>(marker.finger);
     problems_[f].markers.push_back({marker.point, checked_.p_M[marker.slot], weight});
     const std::uint64_t measurement = kMaxMarkers * marker.point + checked_.source[marker.slot];
@@ -165,14 +180,19 @@ void FingerEstimator::prepare(std::size_t finger, Duration dt) noexcept {
   problem.upper_rad = config_.upper_rad[finger];
   const auto n = 3 * static_cast<Index>(moved);
   problem.lower_rad.tail(9 - n) = problem.upper_rad.tail(9 - n) = q.tail(9 - n);
+  const double reach = config_.catch_up_rad_s * to_seconds(std::min(dt, kLongestStep)) /
+                       std::sqrt(3.0);  // per component of a rotation vector
   if (memory.catching_up) {
-    const double reach =
-        config_.catch_up_rad_s * to_seconds(dt) / std::sqrt(3.0);  // per component of a rotation vector
     problem.lower_rad = problem.lower_rad.cwiseMax((q.array() - reach).matrix()).cwiseMin(q);
     problem.upper_rad = problem.upper_rad.cwiseMin((q.array() + reach).matrix()).cwiseMax(q);
   }
   problem.q_previous_rad = q;
   problem.start_rad = q;
+  if (memory.unfold_to_rad) {
+    const double left = *memory.unfold_to_rad - q(kMiddleFlexion);
+    problem.start_rad(kMiddleFlexion) += std::clamp(left, -reach, reach);
+    problem.lower_rad(kMiddleFlexion) = problem.upper_rad(kMiddleFlexion) = problem.start_rad(kMiddleFlexion);
+  }
   const double per_step =
       std::sqrt(to_seconds(kUsualStep) / to_seconds(dt));  // a random walk: variance grows with time
   problem.temporal_m_rad = memory.known ? Vector9(per_step * config_.temporal_m_rad[finger]) : Vector9::Zero();
@@ -187,56 +207,95 @@ void FingerEstimator::solve(std::size_t finger, HandState& state) noexcept {
   iterations_[finger] = solution.iterations;
   state.quality[finger] = FingerQuality::kHeld;
   if (solution.status == SolveStatus::kInvalid) return;
-  if (memory.catching_up) {
-    const auto free = [](double limit, double range) { return std::abs(limit - range) > 1e-12; };
-    bool limited = false;
-    for (Index i = 0; i < 9; ++i) {
-      if (!(problem.lower_rad(i) < problem.upper_rad(i))) continue;
-      limited |= solution.q_rad(i) <= problem.lower_rad(i) && free(problem.lower_rad(i), config_.lower_rad[finger](i));
-      limited |= solution.q_rad(i) >= problem.upper_rad(i) && free(problem.upper_rad(i), config_.upper_rad[finger](i));
+  // A bound of the problem is one of the joint's range, or how far it may move in this step.
+  bool at_range = false, at_reach = false;
+  for (Index i = 0; i < 9; ++i) {
+    if (!(problem.lower_rad(i) < problem.upper_rad(i))) continue;
+    for (const auto& [pressed, bound, range] :
+         {std::tuple{solution.q_rad(i) <= problem.lower_rad(i), problem.lower_rad(i), config_.lower_rad[finger](i)},
+          std::tuple{solution.q_rad(i) >= problem.upper_rad(i), problem.upper_rad(i), config_.upper_rad[finger](i)}}) {
+      if (pressed) (std::abs(bound - range) > 1e-12 ? at_reach : at_range) = true;
     }
-    memory.catching_up = limited;
   }
+  const bool led = memory.unfold_to_rad.has_value();
+  if (led && std::abs(solution.q_rad(kMiddleFlexion) - *memory.unfold_to_rad) < 1e-9) memory.unfold_to_rad.reset();
+  memory.catching_up = memory.catching_up && (at_reach || led);
   memory.q_rad = solution.q_rad;
   memory.known = true;
   memory.unseen = Duration{0};
-  const FingerChain chain = model_.chain(problem.finger, solution.q_rad);
+  memory.chain = model_.chain(problem.finger, solution.q_rad);
+  memory.cost_m2 = solution.cost_m2;
   double distance_m = 0.0;
   for (const FingerMeasurement& marker : problem.markers) {
-    distance_m += (model_.point(problem.finger, marker.point, chain) - marker.p_M).norm();
+    distance_m += (model_.point(problem.finger, marker.point, memory.chain) - marker.p_M).norm();
   }
   memory.residual_m = distance_m / static_cast<double>(problem.markers.size());
   state.q_rad.segment<9>(static_cast<Index>(kFingerOffset[finger])) = solution.q_rad;
-  state.p_M[finger] = {model_.point(problem.finger, 0, chain), model_.point(problem.finger, 1, chain)};
+  state.p_M[finger] = {model_.point(problem.finger, 0, memory.chain), model_.point(problem.finger, 1, memory.chain)};
   state.residual_m[finger] = memory.residual_m;
-  state.quality[finger] = solution.status == SolveStatus::kCapped    ? FingerQuality::kCapped
-                          : solution.status == SolveStatus::kAtLimit ? FingerQuality::kAtLimit
-                                                                     : FingerQuality::kOptimal;
+  state.quality[finger] = solution.status == SolveStatus::kCapped ? FingerQuality::kCapped
+                          : at_range                              ? FingerQuality::kAtLimit
+                                                                  : FingerQuality::kOptimal;
 }
 
 /// Tells the guard where the model has each marker now, and answers its question.
 void FingerEstimator::explain() noexcept {
-  std::array<FingerChain, kFingers> chains;
-  for (std::size_t f = 0; f < kFingers; ++f) {
-    if (carried_[f] > 0) chains[f] = model_.chain(static_cast<Finger>(f), memory_[f].q_rad);
-  }
   for (const FingerMarker& marker : glove_.finger_markers) {
     if (marker.slot >= kMaxMarkers || marker.point >= model_.point_count(marker.finger)) continue;
-    const Vector3d model_M = model_.point(marker.finger, marker.point, chains[static_cast<std::size_t>(marker.finger)]);
+    const FingerChain& chain = memory_[static_cast<std::size_t>(marker.finger)].chain;
+    const Vector3d model_M = model_.point(marker.finger, marker.point, chain);
     if (!config_.trust_labels) {
       guard_.explain(marker.slot, model_M, checked_);
     } else if (checked_.usable(marker.slot)) {
       checked_.residual_m[marker.slot] = (model_M - checked_.p_M[marker.slot]).norm();
     }
   }
-  if (config_.trust_labels || !guard_.trial()) return;
-  const MarkerTrial trial = *guard_.trial();
+}
+
+/// Would the finger explain the markers as the guard suspects them?
+void FingerEstimator::answer(const MarkerTrial& trial) noexcept {
   FingerProblem problem = problems_[static_cast<std::size_t>(trial.finger)];
   problem.model = &model_;
   problem.lower_rad = config_.lower_rad[static_cast<std::size_t>(trial.finger)];
   problem.upper_rad = config_.upper_rad[static_cast<std::size_t>(trial.finger)];
   problem.start_rad = memory_[static_cast<std::size_t>(trial.finger)].q_rad;
-  guard_.answer(posture_residual_m(problem, trial, config_.max_iterations, config_.tolerance));
+  guard_.answer(
+      posture_residual_m(problem, trial, std::min(config_.max_iterations, kTrialIterations), config_.tolerance));
+}
+
+/// The middle joint is straight or beyond.
+bool FingerEstimator::overstretched(std::size_t finger) const noexcept {
+  constexpr double kStraight = 0.02;
+  const FingerMemory& memory = memory_[finger];
+  if (problems_[finger].markers.empty() || memory.catching_up) return false;
+  return side_sign() * memory.q_rad(kMiddleFlexion) < kStraight;
+}
+
+/// Looks at one finger per frame: the thumb, whose joints turn about other axes, is left out.
+void FingerEstimator::unfold() noexcept {
+  for (std::size_t i = 0; i < kFingers; ++i) {
+    const std::size_t finger = unfold_next_;
+    unfold_next_ = (unfold_next_ + 1) % kFingers;
+    if (finger == static_cast<std::size_t>(Finger::kThumb) || !overstretched(finger)) continue;
+    unfold(finger);
+    return;
+  }
+}
+
+/// Solves once more from a bent posture with about the same tip. There is no way back but through smaller bends: no
+/// chatter.
+void FingerEstimator::unfold(std::size_t finger) noexcept {
+  constexpr double kBent = 0.1;
+  FingerProblem problem = problems_[finger];
+  problem.temporal_m_rad.setZero();  // the way there does not count
+  problem.start_rad = memory_[finger].q_rad + side_sign() * angles(0, 0, -.35, 0, 0, .7, 0, 0, .45);
+  problem.start_rad = problem.start_rad.cwiseMax(problem.lower_rad).cwiseMin(problem.upper_rad);
+  const FingerSolution bent = solve_own(problem, std::min(config_.max_iterations, kTrialIterations), config_.tolerance);
+  unfold_iterations_ = bent.iterations;
+  const bool solved = bent.status == SolveStatus::kOptimal || bent.status == SolveStatus::kAtLimit;
+  if (!solved || !(bent.cost_m2 < memory_[finger].cost_m2) || side_sign() * bent.q_rad(kMiddleFlexion) < kBent) return;
+  memory_[finger].unfold_to_rad = bent.q_rad(kMiddleFlexion);
+  memory_[finger].catching_up = true;
 }
 
 void FingerEstimator::rate(const HandPose& hand_pose, HandState& state) const noexcept {
@@ -255,12 +314,15 @@ void FingerEstimator::hold(std::size_t finger, Duration dt, HandState& state) no
   FingerMemory& memory = memory_[finger];
   iterations_[finger] = 0;
   memory.seen = 0;
-  memory.unseen = std::min(memory.unseen + dt, Duration{std::chrono::hours(1)});
+  memory.unfold_to_rad.reset();
+  memory.unseen += std::min(dt, kLongest - memory.unseen);
   const bool lost = memory.unseen > config_.hold;
   if (lost) memory.q_rad *= std::exp(-to_seconds(dt) / to_seconds(config_.decay));
   memory.q_rad = memory.q_rad.cwiseMax(config_.lower_rad[finger]).cwiseMin(config_.upper_rad[finger]);
   state.q_rad.segment<9>(static_cast<Index>(kFingerOffset[finger])) = memory.q_rad;
-  state.p_M[finger] = model_.finger_points(static_cast<Finger>(finger), memory.q_rad);
+  const auto id = static_cast<Finger>(finger);
+  memory.chain = model_.chain(id, memory.q_rad);
+  state.p_M[finger] = {model_.point(id, 0, memory.chain), model_.point(id, 1, memory.chain)};
   state.residual_m[finger] = memory.residual_m;
   state.quality[finger] = !memory.known ? FingerQuality::kNone : lost ? FingerQuality::kLost : FingerQuality::kHeld;
 }

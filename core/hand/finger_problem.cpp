@@ -64,7 +64,11 @@ void evaluate(const FingerProblem& problem, const Vector9& q, Model& at) noexcep
     at.cost += marker.weight * error.squaredNorm();
     at.gradient += marker.weight * J.transpose().lazyProduct(error);
     for (Index i = 0; i < n; ++i) {
-      for (Index k = 0; k < n; ++k) at.gauss_newton(i, k) += marker.weight * J.col(i).dot(J.col(k));
+      for (Index k = 0; k <= i; ++k) {
+        const double s = marker.weight * J.col(i).dot(J.col(k));
+        at.gauss_newton(i, k) += s;
+        if (k != i) at.gauss_newton(k, i) += s;
+      }
     }
     model.add_curvature(problem.finger, marker.point, chain, marker.weight * error, at.curvature);
   }

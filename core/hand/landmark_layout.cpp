@@ -24,6 +24,13 @@ GloveLayout landmark_layout() noexcept {
   return layout;
 }
 
+FingerEstimatorConfig for_landmarks(FingerEstimatorConfig config) noexcept {
+  config.trust_labels = true;
+  config.least_confidence = 0.3;
+  config.confidence = {/*residual_m=*/0.02, /*fit_error_m=*/0.01};
+  return config;
+}
+
 HandPoints landmark_points(const HandData& data) {
   HandPoints points = default_points(data);
   for (std::size_t finger = 0; finger < kFingers; ++finger) {

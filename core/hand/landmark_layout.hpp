@@ -1,6 +1,7 @@
 #pragma once
 // The 21 landmarks of optical hand trackers in the order of MediaPipe Hands (Zhang et al. 2020) - WebXR's joints
 // without the metacarpals of the four fingers - and what each is on the hand model.
+#include "core/hand/finger_estimator.hpp"
 #include "core/hand/glove_layout.hpp"
 #include "core/hand/hand_model.hpp"
 
@@ -34,6 +35,10 @@ inline constexpr std::array<PalmLandmark, 6> kPalmLandmarks{{{0, 0},
 /// The model's points for landmark_layout(): per finger the default tip and middle point, which the embodiment mapping
 /// follows, then its second and third joint and the fleshy tip. Allocates nothing.
 [[nodiscard]] HandPoints landmark_points(const HandData& data);
+
+/// `config` as a landmark tracker needs it: labels are what they say (a landmark is never another one), a landmark that
+/// the tracker is hardly sure of moves nothing, and errors of some millimetres are usual.
+[[nodiscard]] FingerEstimatorConfig for_landmarks(FingerEstimatorConfig config) noexcept;
 
 using FingerAngles = Eigen::Matrix<double, static_cast<int>(kHandAngles), 1>;
 

@@ -69,7 +69,7 @@ void MarkerGuard::step(const MarkerFrame& frame, const HandPose& hand_pose, Chec
   judge_slip();
   step_time(frame.t_capture);
   drop_unexplained();
-  read(frame, hand_pose.X_WM);
+  read(frame, hand_pose);
   trial_.reset();
   if (hand_pose.valid) {
     follow_reference();
@@ -77,8 +77,6 @@ void MarkerGuard::step(const MarkerFrame& frame, const HandPose& hand_pose, Chec
     exchange();
     place_rest();
     ask();
-  } else {
-    for (Entry& entry : entries_) entry.seen = false;
   }
   report(out);
 }
@@ -99,13 +97,13 @@ double MarkerGuard::gate_m(std::size_t i, std::size_t k) const noexcept {
   return doubted ? kDoubtedGateShare * gate_m_ : gate_m_;
 }
 
-/// Labels of the frame, in M.
-void MarkerGuard::read(const MarkerFrame& frame, const Pose& X_WM) noexcept {
-  const Pose X_MW = X_WM.inverse();
+/// Labels of the frame, in M; without a hand pose nothing is seen.
+void MarkerGuard::read(const MarkerFrame& frame, const HandPose& hand_pose) noexcept {
+  const Pose X_MW = hand_pose.X_WM.inverse();
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
     entry.seen = entry.taken = entry.placed = false;
-    if (entry.marker.slot < frame.count && frame.markers[entry.marker.slot].visible) {
+    if (hand_pose.valid && entry.marker.slot < frame.count && frame.markers[entry.marker.slot].visible) {
       entry.p_M = X_MW * frame.markers[entry.marker.slot].p_W;
       entry.seen = entry.p_M.allFinite();
     }

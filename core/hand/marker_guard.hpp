@@ -89,7 +89,7 @@ class MarkerGuard {
 
   void step_time(TimePoint t_capture) noexcept;
   [[nodiscard]] double gate_m(std::size_t i, std::size_t k) const noexcept;
-  void read(const MarkerFrame& frame, const Pose& X_WM) noexcept;
+  void read(const MarkerFrame& frame, const HandPose& hand_pose) noexcept;
   void follow_reference() noexcept;
   void keep_sources() noexcept;
   void exchange() noexcept;

@@ -15,10 +15,6 @@ constexpr std::uint32_t kLongestRun = 1U << 20;  // of a mean: bounds its counte
 constexpr std::array<std::array<std::uint8_t, 3>, 6> kOrders{
     {{0, 1, 2}, {1, 0, 2}, {2, 1, 0}, {0, 2, 1}, {1, 2, 0}, {2, 0, 1}}};
 
-TriadEdges edges_of(const Triad& p) noexcept {
-  return {(p[0] - p[1]).norm(), (p[0] - p[2]).norm(), (p[1] - p[2]).norm()};
-}
-
 /// Edge between the markers i and j, 0..2.
 double edge(const TriadEdges& edges_m, std::size_t i, std::size_t j) noexcept {
   return edges_m[i + j - 1];
@@ -61,6 +57,10 @@ Choice best_order(const TriadEdges& edges_m, const TriadEdges& reference_m, doub
 }
 
 }  // namespace
+
+TriadEdges edges_of(const Triad& p) noexcept {
+  return {(p[0] - p[1]).norm(), (p[0] - p[2]).norm(), (p[1] - p[2]).norm()};
+}
 
 TriadCheck::TriadCheck(const TriadEdges& edges_m, const TriadConfig& config) noexcept : config_(config) {
   const bool given = std::all_of(edges_m.begin(), edges_m.end(), [](double e) { return e > 0.0 && std::isfinite(e); });

@@ -29,6 +29,8 @@ using TriadEdges = std::array<double, 3>;
 /// Top, left, right.
 using Triad = std::array<Eigen::Vector3d, 3>;
 
+[[nodiscard]] TriadEdges edges_of(const Triad& p) noexcept;
+
 /// Steps once per frame. Never changes a known shape, calibrated or learnt. No heap, about 0.1 us.
 class TriadCheck {
  public:

@@ -9,12 +9,15 @@ namespace embody::teleop {
 /// streak then starts anew and `jumps` counts it, so that no motion goes on across a jump.
 class PoseMonitor {
  public:
+  /// `gap`: a longer time between two poses begins a new streak.
+  explicit PoseMonitor(Duration gap = std::chrono::milliseconds(50)) noexcept : gap_(gap) {}
+
   void step(HandPose& pose) noexcept {
     if (!pose.valid || !math::is_valid(pose.X_WM)) {
       pose.valid = false;
       streak_ = 0;
     } else if (!started_ || plausible(pose, last_)) {
-      const bool gap = !started_ || pose.t_capture - last_.t_capture > kGap;
+      const bool gap = !started_ || pose.t_capture - last_.t_capture > gap_;
       streak_ = gap ? 1 : streak_ + 1;
       last_ = pose;
       started_ = true;
@@ -41,7 +44,6 @@ class PoseMonitor {
   static constexpr double kNoise_m = 0.01;
   static constexpr double kNoise_rad = 0.1;
   static constexpr std::uint32_t kAcceptAfter = 5;
-  static constexpr Duration kGap = std::chrono::milliseconds(50);
 
   [[nodiscard]] static bool plausible(const HandPose& pose, const HandPose& before) noexcept {
     const double dt_s = std::max(0.0, to_seconds(pose.t_capture - before.t_capture));
@@ -50,6 +52,7 @@ class PoseMonitor {
     return distance <= kNoise_m + kSpeed_m_s * dt_s && angle <= kNoise_rad + kSpeed_rad_s * dt_s;
   }
 
+  Duration gap_;
   HandPose last_;
   HandPose suspect_;
   bool started_{false};

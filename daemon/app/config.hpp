@@ -14,7 +14,7 @@
 
 namespace embody::config {
 
-inline constexpr int kSchema = 1;  ///< raised when a key changes its meaning or disappears
+inline constexpr int kSchema = 1;  ///< raised when, after a release, a key changes its meaning or disappears
 
 /// Where a tracker of hand landmarks sends its datagrams (docs/landmarks.md).
 struct LandmarkConfig {
@@ -28,7 +28,7 @@ struct LandmarkConfig {
             "IPv4 address of the interface to receive at. Whoever can send to it moves the hand: not the loopback only "
             "in a network of its own.");
     v.field("port", port, Range{1, 65535}, "UDP port.");
-    v.field("rate_hz", rate_hz, Range{1, 1000}, "Frames per second that the sender nominally makes.");
+    v.field("rate_hz", rate_hz, Range{10, 1000}, "Frames per second that the sender nominally makes.");
   }
 };
 
@@ -348,7 +348,7 @@ struct EmbodyConfig {
 };
 
 /// `config` with the times that a sensor slower than 100 Hz needs: resample_delay_ms of at least one and a half frame
-/// periods, hold_after_ms of at least three.
+/// periods, hold_after_ms of at least three, stop_after_ms of at least twice that: all within the ranges of these keys.
 [[nodiscard]] EmbodyConfig adapted_to_sensor(EmbodyConfig config);
 
 }  // namespace embody::config

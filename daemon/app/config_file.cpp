@@ -1,14 +1,9 @@
 #include "daemon/app/config_file.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 
 #include "daemon/app/config_io.hpp"
+#include "drivers/transport/file.hpp"
 
 namespace embody::config {
 namespace fs = std::filesystem;
@@ -18,11 +13,6 @@ namespace {
 bool is_there(const fs::path& path) noexcept {
   std::error_code ignored;
   return fs::exists(path, ignored);
-}
-
-Error open_error(const std::string& path, int number) {
-  const Errc code = number == ENOENT ? Errc::kNotFound : number == EACCES ? Errc::kPermission : Errc::kIo;
-  return make_error(code, "%s: cannot be read: %s", shorten_path(path).c_str(), std::strerror(number));
 }
 
 /// Folder of this program, without its last component's links.
@@ -40,28 +30,7 @@ std::string shorten_path(const std::string& path) {
 }
 
 Result<std::string> read_file(const fs::path& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return open_error(path.string(), errno);
-  struct stat status {};
-  if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
-    ::close(fd);
-    return make_error(Errc::kMalformed, "%s: is not a regular file", shorten_path(path.string()).c_str());
-  }
-  std::string content(kMaxConfigBytes + 1, '\0');
-  std::size_t size = 0;
-  ssize_t got = 0;
-  while (size < content.size() && (got = ::read(fd, content.data() + size, content.size() - size)) > 0) {
-    size += static_cast<std::size_t>(got);
-  }
-  const int number = errno;
-  ::close(fd);
-  if (got < 0) return open_error(path.string(), number);
-  if (size > kMaxConfigBytes) {
-    return make_error(Errc::kMalformed, "%s: larger than %zu bytes: this is no configuration file",
-                      shorten_path(path.string()).c_str(), kMaxConfigBytes);
-  }
-  content.resize(size);
-  return content;
+  return transport::load_text(path.string(), kMaxConfigBytes, "a configuration file (.toml)");
 }
 
 std::vector<fs::path> data_folders() {

@@ -72,8 +72,7 @@ Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<Statu
 
 }  // namespace
 
-Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& given) {
-  const config::EmbodyConfig config = config::adapted_to_sensor(given);
+Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& config) {
   for (const auto& [key, name, known] :
        {std::tuple{"arm", &config.arm.driver, "ur_rtde"}, {"hand", &config.hand.driver, "mia"}}) {
     if (*name == known) continue;
@@ -103,7 +102,7 @@ Daemon::Daemon(const config::EmbodyConfig& config, const Models& models, std::un
       tracker_baton_(*tracker_),
       arm_baton_(*arm_),
       hand_baton_(*hand_),
-      tracker_loop_(tracker_baton_, models.hand_pose, models.predictor, edges_),
+      tracker_loop_(tracker_baton_, models.hand_pose, models.monitor, models.predictor, edges_),
       finger_loop_(models.fingers, models.filter, models.embodiment,
                    SlowDown{config.record_mapping.slow_down, config.record_mapping.slow_down_spins}, edges_),
       arm_loop_(arm_baton_, tracker_baton_, models.arm, mode_config(config.safety), arm_loop_config(config), edges_),

@@ -139,8 +139,9 @@ int run_program(int argc, char** argv) {
   if (!path) return fail(path.error(), kExitConfiguration);
   const Result<config::EmbodyConfig> config = config::load_config(*path);
   if (!config) return fail(config.error(), kExitConfiguration);
-  if (!print_config) return run(*config);
-  std::cout << config::print_toml(*config);
+  const config::EmbodyConfig adapted = config::adapted_to_sensor(*config);
+  if (!print_config) return run(adapted);
+  std::cout << config::print_toml(adapted);
   return kExitOk;
 }
 

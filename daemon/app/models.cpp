@@ -1,11 +1,7 @@
 #include "daemon/app/models.hpp"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <sstream>
-
 #include "core/robot/urdf_model.hpp"
+#include "drivers/transport/file.hpp"
 
 namespace embody {
 namespace {
@@ -32,6 +28,13 @@ hand::HandStateFilter make_filter(const config::FilterConfig& config, const hand
   return {model, filter};
 }
 
+/// Poses of a slow sensor follow each other without a gap too.
+teleop::PoseMonitor make_monitor(const config::TrackerConfig& tracker) {
+  constexpr double kPeriods = 2.5, kUsualRate_hz = 50.0;
+  const bool slow = tracker.driver == config::TrackerDriver::kLandmarks && tracker.landmarks.rate_hz < kUsualRate_hz;
+  return slow ? teleop::PoseMonitor(from_seconds(kPeriods / tracker.landmarks.rate_hz)) : teleop::PoseMonitor();
+}
+
 teleop::PosePredictor make_predictor(const config::FilterConfig& config) {
   teleop::PosePredictorConfig predictor;
   predictor.ahead = config.predict_pose;
@@ -41,12 +44,9 @@ teleop::PosePredictor make_predictor(const config::FilterConfig& config) {
 }
 
 Result<EmbodimentMapping> make_embodiment(const EmbodimentConfig& hand) {
-  std::ifstream file(hand.urdf, std::ios::binary);
-  if (!file) return make_error(Errc::kNotFound, "cannot read %s: %s", hand.urdf.c_str(), std::strerror(errno));
-  std::string text(robot::kMaxUrdfBytes + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  const Result<robot::RobotModel> model = robot::load_urdf(text);
+  const auto text = transport::load_text(hand.urdf, robot::kMaxUrdfBytes, "a robot model (.urdf)");
+  if (!text) return text.error();
+  const Result<robot::RobotModel> model = robot::load_urdf(*text);
   if (!model) {
     return make_error(model.error().code, "%s: %s", hand.urdf.c_str(), model.error().detail.c_str());
   }
@@ -86,6 +86,7 @@ Result<Models> make_models(const config::EmbodyConfig& config) {
                 make_hand_pose(config, *models),
                 hand::FingerEstimator(model, models->layout, models->fingers),
                 make_filter(config.record_mapping.filter, model),
+                make_monitor(config.tracker),
                 make_predictor(config.record_mapping.filter),
                 std::move(*embodiment),
                 arm};

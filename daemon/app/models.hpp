@@ -4,6 +4,7 @@
 #include "core/hand/hand_state_filter.hpp"
 #include "core/hand/palm_pose_estimator.hpp"
 #include "core/teleop/arm_controller.hpp"
+#include "core/teleop/pose_monitor.hpp"
 #include "core/teleop/pose_predictor.hpp"
 #include "daemon/app/operator_models.hpp"
 
@@ -15,6 +16,7 @@ struct Models {
   hand::PoseEstimator hand_pose;
   hand::FingerEstimator fingers;
   hand::HandStateFilter filter;
+  teleop::PoseMonitor monitor;
   teleop::PosePredictor predictor;
   EmbodimentMapping embodiment;
   teleop::ArmControllerConfig arm;

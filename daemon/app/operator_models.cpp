@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/hand/calibration.hpp"
 #include "core/hand/landmark_layout.hpp"
 #include "drivers/mano/mano_file.hpp"
 
@@ -80,27 +81,26 @@ Status add_glove(const config::GloveConfig& glove, OperatorModels& models) {
 /// Calibrated places instead of the glove's. Tip and middle stay what the robot's fingers follow: their markers get
 /// points of their own.
 Status add_places(const config::SubjectConfig& subject, OperatorModels& models) {
-  models.layout.back_edges_m = subject.back_edges_m;
+  hand::Calibration places;
+  places.back_edges_m = subject.back_edges_m;
   for (const config::MarkerPlaceConfig& place : subject.markers) {
-    hand::FingerMarker* marker = nullptr;
-    for (hand::FingerMarker& candidate : models.layout.finger_markers) {
-      if (models.layout.names[candidate.slot].view() == place.marker) marker = &candidate;
-    }
-    if (marker == nullptr) {
+    const auto* marker = std::find_if(
+        models.layout.finger_markers.begin(), models.layout.finger_markers.end(),
+        [&](const hand::FingerMarker& known) { return models.layout.names[known.slot].view() == place.marker; });
+    if (marker == models.layout.finger_markers.end()) {
       return make_error(Errc::kInvalidArgument, "[subject] markers: '%.48s' is no finger marker of the glove",
                         place.marker.c_str());
     }
-    hand::HandPoint point;
-    point.joint = joint_of(marker->finger, place.joint);
-    point.offset_m = vector<Eigen::Vector3d>(place.offset_m);
-    auto& points = models.points[static_cast<std::size_t>(marker->finger)];
-    if (marker->point >= 2) {
-      points[marker->point] = point;
-    } else {
-      marker->point = points.size();
-      if (!points.push_back(point)) return full(marker->finger);
-    }
+    hand::CalibratedMarker known;
+    known.slot = marker->slot;
+    known.finger = marker->finger;
+    known.joint = joint_of(marker->finger, place.joint);
+    known.offset_m = vector<Eigen::Vector3d>(place.offset_m);
+    places.markers.push_back(known);
   }
+  const hand::CalibratedGlove glove = hand::apply(places, models.layout, models.points);
+  models.layout = glove.glove;
+  models.points = glove.points;
   return {};
 }
 
@@ -138,8 +138,7 @@ Result<OperatorModels> make_operator_models(const config::EmbodyConfig& config) 
   if (config.tracker.driver == config::TrackerDriver::kLandmarks) {
     models.layout = hand::landmark_layout();
     models.points = hand::landmark_points(models.data);
-    models.fingers.trust_labels = true;                                       // a landmark is never another one
-    models.fingers.confidence = {/*residual_m=*/0.02, /*fit_error_m=*/0.01};  // noise of some 5 mm is usual
+    models.fingers = hand::for_landmarks(models.fingers);
   } else {
     models.points = hand::default_points(models.data);
     if (const Status added = add_glove(config.glove, models); !added) return added.error();

@@ -63,4 +63,13 @@ void print_failure(bool json, const std::string& code, const std::string& messag
   std::fprintf(stderr, "embodyctl: %s\n", printable(message.empty() ? code : message).c_str());
 }
 
+int fail(const Error& error, int exit_code) {
+  print_failure(false, code_of(error.code), std::string(error.detail.view()));
+  return exit_code;
+}
+
+int fail_file(const Error& error) {
+  return fail(error, error.code == Errc::kPermission ? kExitPermission : kExitFailed);
+}
+
 }  // namespace embody::ctl

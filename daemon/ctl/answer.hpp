@@ -19,5 +19,9 @@ namespace embody::ctl {
 void print_success(bool json, const std::string& command, const std::string& result);
 /// JSON: {"ok":false,"error":{...}} on standard output; else one sentence on standard error.
 void print_failure(bool json, const std::string& code, const std::string& message);
+/// One sentence on standard error; returns `exit_code`.
+[[nodiscard]] int fail(const Error& error, int exit_code);
+/// The same for a file that cannot be read or written: kExitPermission or kExitFailed.
+[[nodiscard]] int fail_file(const Error& error);
 
 }  // namespace embody::ctl

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,11 @@
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/collect_frames.hpp"
 #include "daemon/ctl/command.hpp"
-#include "daemon/ctl/output_file.hpp"
 #include "daemon/ctl/status_table.hpp"
 #include "daemon/evaluate/calibration_report.hpp"
 #include "daemon/evaluate/recorded_frames.hpp"
 #include "drivers/recording/tsv_recording.hpp"
+#include "drivers/transport/file.hpp"
 
 namespace embody::ctl {
 namespace {
@@ -28,7 +29,7 @@ struct Options {
   int duration_s{10};
   std::string output{"subject.toml"};
   bool force{false};
-  std::string json_file;
+  std::optional<std::string> json_file;
 };
 
 /// What is calibrated from, or the exit code of what went wrong (and was said).
@@ -38,15 +39,8 @@ struct Source {
   int exit_code{kExitOk};
 };
 
-int fail(const Error& error, int exit_code) {
-  print_failure(false, code_of(error.code), std::string(error.detail.view()));
-  return exit_code;
-}
 int fail_device(const Error& error) {
   return fail(error, error.code == Errc::kTimeout ? kExitUnavailable : exit_code_of(error.code));
-}
-int fail_file(const Error& error) {
-  return fail(error, error.code == Errc::kPermission ? kExitPermission : kExitFailed);
 }
 
 Source read_recording(const Options& options, const hand::GloveLayout& layout) {
@@ -87,6 +81,20 @@ Source record_live(const Options& options, const config::EmbodyConfig& config, c
           "the tracker at " + printable(config.tracker.host) + ", " + std::to_string(options.duration_s) + " s"};
 }
 
+/// Before ten seconds of motion are asked for. The figures come from the same run as the subject file: --force is of
+/// both.
+int check_outputs(const Options& options) {
+  if (const Status writable = transport::check_output(options.output, options.force); !writable) {
+    return fail_file(writable.error());
+  }
+  if (!options.json_file) return kExitOk;
+  if (*options.json_file == options.output) {
+    return fail(make_error(Errc::kInvalidArgument, "--json and --output name the same file"), kExitUsage);
+  }
+  const Status writable = transport::check_output(*options.json_file, options.force);
+  return writable ? kExitOk : fail_file(writable.error());
+}
+
 std::string date_now() {
   const std::time_t t = std::time(nullptr);
   std::tm local{};
@@ -107,9 +115,7 @@ int run(const Options& options) {
   }
   const auto nominal = make_operator_models(evaluate::nominal_config(*config));
   if (!nominal) return fail(nominal.error(), kExitConfiguration);
-  if (const Status writable = check_output(options.output, options.force); !writable) {
-    return fail_file(writable.error());
-  }
+  if (const int code = check_outputs(options); code != kExitOk) return code;
 
   const Source source = options.recording.empty() ? record_live(options, *config, nominal->layout)
                                                   : read_recording(options, nominal->layout);
@@ -127,12 +133,14 @@ int run(const Options& options) {
   if (!residuals) return fail(residuals.error(), kExitConfiguration);
 
   const std::string text = evaluate::subject_file(subject, *calibration, *residuals, source.name, date_now());
-  if (const Status saved = save_text(text, options.output, options.force); !saved) return fail_file(saved.error());
+  if (const Status saved = transport::save_text(text, options.output, options.force); !saved)
+    return fail_file(saved.error());
   std::printf("%s", evaluate::calibration_text(*calibration, *nominal, *residuals).c_str());
   std::printf("written to %s; in the configuration: [subject] file = \"...\"\n", printable(options.output).c_str());
-  if (options.json_file.empty()) return kExitOk;
+  if (!options.json_file) return kExitOk;
   const std::string json = evaluate::calibration_json(*calibration, *nominal, subject, *residuals) + "\n";
-  if (const Status saved = save_text(json, options.json_file, true); !saved) return fail_file(saved.error());
+  if (const Status saved = transport::save_text(json, *options.json_file, options.force); !saved)
+    return fail_file(saved.error());
   return kExitOk;
 }
 
@@ -142,14 +150,16 @@ void add_calibrate_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<Options>();  // lives in the callback
   CLI::App* command = app.add_subcommand(
       "calibrate", "Find hand shape, marker places and the hand's pose under the glove from free finger motion");
-  command->add_option("RECORDING", options->recording,
-                      "Motion export of Qualisys Track Manager (.tsv); without it: the live tracker");
-  command->add_option("--frames", options->frames,
-                      "First and last frame of the recording, counted from 1, like 1-1000");
+  CLI::Option* recording = command->add_option(
+      "RECORDING", options->recording, "Motion export of Qualisys Track Manager (.tsv); without it: the live tracker");
+  command->add_option("--frames", options->frames, "First and last frame of the recording, counted from 1, like 1-1000")
+      ->needs(recording);
   command->add_option("--config", options->config, "Configuration file (default: the one that embodyd would use)");
-  command->add_option("--duration", options->duration_s, "Live: seconds to collect (10)")->check(CLI::Range(2, 120));
+  command->add_option("--duration", options->duration_s, "Live: seconds to collect (10)")
+      ->check(CLI::Range(2, 120))
+      ->excludes(recording);
   command->add_option("--output", options->output, "Subject file to write (subject.toml)");
-  command->add_flag("--force", options->force, "Replace the subject file if it exists");
+  command->add_flag("--force", options->force, "Replace the files if they exist");
   command->add_option("--json", options->json_file, "Also write the figures to this file");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

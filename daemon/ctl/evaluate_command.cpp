@@ -13,11 +13,11 @@
 #include "daemon/control/exit_code.hpp"
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/command.hpp"
-#include "daemon/ctl/output_file.hpp"
 #include "daemon/ctl/status_table.hpp"
 #include "daemon/evaluate/record_summary.hpp"
 #include "daemon/evaluate/recorded_frames.hpp"
 #include "drivers/recording/tsv_recording.hpp"
+#include "drivers/transport/file.hpp"
 
 namespace embody::ctl {
 namespace {
@@ -31,13 +31,8 @@ struct Options {
   std::string solver;
   std::string objective;
   bool no_prior{false};
-  std::string json_file;
+  std::optional<std::string> json_file;
 };
-
-int fail(const Error& error, int exit_code) {
-  print_failure(false, code_of(error.code), std::string(error.detail.view()));
-  return exit_code;
-}
 
 /// The configuration with what the command line changes.
 Result<config::EmbodyConfig> configuration(const Options& options) {
@@ -86,6 +81,11 @@ int run(const Options& options) {
   Result<OperatorModels> models = make_operator_models(*config);
   if (!models) return fail(models.error(), kExitConfiguration);
   if (options.no_prior) remove_prior(models->fingers);
+  if (options.json_file) {
+    if (const Status writable = transport::check_output(*options.json_file, true); !writable) {
+      return fail_file(writable.error());
+    }
+  }
   evaluate::FrameRange range;
   if (!options.frames.empty()) {
     const auto parsed = evaluate::parse_frame_range(options.frames);
@@ -100,7 +100,7 @@ int run(const Options& options) {
   auto each = nlohmann::ordered_json::array();
   for (const std::string& path : options.recordings) {
     const auto recording = recording::load_tsv(path);
-    if (!recording) return fail(recording.error(), kExitFailed);
+    if (!recording) return fail_file(recording.error());
     const auto frames = evaluate::marker_frames(*recording, models->layout, range);
     if (!frames) return fail(frames.error(), frames.error().code == Errc::kInvalidArgument ? kExitUsage : kExitFailed);
     const auto samples = evaluate::evaluate_record(*models, *frames, evaluation);
@@ -120,12 +120,12 @@ int run(const Options& options) {
     summary.costly.clear();  // frame numbers mean nothing without their recording
     std::printf("all %zu recordings\n%s", options.recordings.size(), evaluate::summary_text(summary).c_str());
   }
-  if (options.json_file.empty()) return kExitOk;
+  if (!options.json_file) return kExitOk;
   auto object = nlohmann::ordered_json::parse(evaluate::summary_json(summary));
   object["recordings"] = std::move(each);
   const std::string text = object.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  if (const Status saved = save_text(text, options.json_file, true); !saved) {
-    return fail(saved.error(), exit_code_of(saved.error().code));
+  if (const Status saved = transport::save_text(text, *options.json_file, true); !saved) {
+    return fail_file(saved.error());
   }
   return kExitOk;
 }

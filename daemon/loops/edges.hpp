@@ -148,7 +148,7 @@ struct Edges {
 
   LoopCounters counters;
   Heartbeats heartbeats;
-  std::atomic<bool> hand_ready{false};    ///< the hand has answered in this session
+  std::atomic<bool> hand_ready{false};    ///< the hand has answered in this connection
   std::atomic<bool> arm_finished{false};  ///< after stop: the arm loop has ended
   std::atomic<bool> arm_still{false};     ///< then: the arm was disarmed or gone, not given up on
   std::atomic<bool> failed{false};        ///< a thread for upkeep ended by an exception

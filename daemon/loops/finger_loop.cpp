@@ -4,22 +4,11 @@
 #include <cstdlib>
 #include <ctime>
 
-#include "core/hand/confidence.hpp"
 #include "drivers/transport/clock.hpp"
 
 namespace embody {
 
 using transport::now;
-
-namespace {
-
-/// Of the pose that everything else is measured in. Sensors without back markers judge their pose themselves.
-double back_confidence(const TrackedFrame& tracked) noexcept {
-  if (!tracked.back.checked) return tracked.pose.valid ? 1.0 : 0.0;
-  return hand::hand_confidence(tracked.pose.valid, tracked.pose.fit_error_m, {}, {});
-}
-
-}  // namespace
 
 void FingerLoop::run() noexcept {
   while (!edges_.stop.load(std::memory_order_relaxed)) {
@@ -36,7 +25,7 @@ void FingerLoop::use(const TrackedFrame& tracked) noexcept {
   filter_.step(report_.state);
   report_.state.t_estimated = now();
   mapping_.step(report_.state, report_.target);
-  report_.target.hand_confidence = back_confidence(tracked);
+  report_.target.hand_confidence = estimator_.back_confidence(tracked.pose);
   slow_down(t_start);
   const TimePoint t_solved = now();
   report_.target.t_solved = t_solved;

@@ -9,9 +9,9 @@ namespace embody {
 
 class TrackerLoop {
  public:
-  TrackerLoop(TrackerBaton& baton, const hand::PoseEstimator& estimator, const teleop::PosePredictor& predictor,
-              Edges& edges) noexcept
-      : baton_(baton), estimator_(estimator), predictor_(predictor), edges_(edges) {}
+  TrackerLoop(TrackerBaton& baton, const hand::PoseEstimator& estimator, const teleop::PoseMonitor& monitor,
+              const teleop::PosePredictor& predictor, Edges& edges) noexcept
+      : baton_(baton), estimator_(estimator), monitor_(monitor), predictor_(predictor), edges_(edges) {}
   /// Until edges.stop. No heap, lock, log or exception.
   void run() noexcept;
 

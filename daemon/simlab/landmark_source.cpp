@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <optional>
 #include <random>
 
 #include "core/hand/landmark_layout.hpp"
 #include "core/hand/synthetic_motion.hpp"
+#include "drivers/transport/file.hpp"
 
 namespace embody::sim {
 namespace {
@@ -126,17 +124,9 @@ Result<LandmarkRecording> parse_landmarks(std::string_view text, const std::stri
 }
 
 Result<LandmarkRecording> load_landmarks(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return make_error(Errc::kNotFound, "cannot read %.120s: %s", path.c_str(), std::strerror(errno));
-  std::string text;
-  std::array<char, 65536> chunk{};
-  while (file.read(chunk.data(), chunk.size()) || file.gcount() > 0) {
-    text.append(chunk.data(), static_cast<std::size_t>(file.gcount()));
-    if (text.size() > kMaxFileBytes) {
-      return make_error(Errc::kMalformed, "%.120s has more than 64 MiB: this is no landmark table", path.c_str());
-    }
-  }
-  return parse_landmarks(text, path);
+  const auto text = transport::load_text(path, kMaxFileBytes, "a table of hand landmarks (.csv)");
+  if (!text) return text.error();
+  return parse_landmarks(*text, path);
 }
 
 LandmarkRecording make_landmarks(double rate_hz, double duration_s, std::uint64_t seed) {

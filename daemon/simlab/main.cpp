@@ -3,6 +3,7 @@
 #include <poll.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <iostream>
@@ -150,17 +151,29 @@ int send_landmarks(LandmarkOptions options) {
   return kExitOk;
 }
 
+/// As CLI::Range, which takes "nan" for a number in range.
+CLI::Validator between(double low, double high) {
+  const CLI::Range range(low, high);
+  return CLI::Validator(
+      [range](std::string& text) {
+        double value = 0.0;
+        const bool number = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
+        return number ? range(text) : "Value " + text + " is not a number";
+      },
+      range.get_description());
+}
+
 void add_landmark_options(CLI::App& command, LandmarkOptions& options) {
   command.add_option("recording", options.recording, "Table of landmarks (CSV) to send; without it a motion is made");
   command.add_option("--rate", options.sender.rate_hz, "Frames per second")
-      ->check(CLI::Range(1.0, 1000.0))
+      ->check(between(1.0, 1000.0))
       ->capture_default_str();
   command.add_option("--host", options.sender.host, "IPv4 address to send to")->capture_default_str();
   command.add_option("--port", options.sender.port, "UDP port to send to")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   command.add_option("--duration", options.duration_s, "Seconds of the motion that is made")
-      ->check(CLI::Range(1.0, 600.0));
+      ->check(between(1.0, 600.0));
   command.add_option("--seed", options.seed, "Seed of its noise");
   command.add_flag("--loop", options.sender.loop, "Begin again after the last frame, until a signal");
 }
@@ -189,7 +202,7 @@ int run_program(int argc, char** argv) {
   std::uint64_t seed = sim::kDemoSeed;
   CLI::App* generate_command = app.add_subcommand("generate", "Write the demo recording: reach, grasp, lift, place");
   generate_command->add_option("output", output, "TSV file to write")->required();
-  generate_command->add_option("--duration", duration_s, "Length in seconds")->check(CLI::Range(5.0, 600.0));
+  generate_command->add_option("--duration", duration_s, "Length in seconds")->check(between(5.0, 600.0));
   generate_command->add_option("--seed", seed, "Seed of noise and drop-outs");
 
   LandmarkOptions landmarks;

@@ -61,7 +61,7 @@ class LandmarkTracker final : public HandTracker {
   std::uint16_t port_{0};
   FixedString<240> reason_;
   teleop::ClockMap clock_;
-  bool started_{false};  // a frame was used in this session
+  bool started_{false};  // a frame was used in this connection
   std::uint64_t last_frame_{0};
   std::uint32_t epoch_{0};
 

@@ -13,6 +13,7 @@
 
 #include "drivers/qualisys/codec.hpp"
 #include "drivers/qualisys/stream_reassembler.hpp"
+#include "drivers/sim/qtm/label_faults.hpp"
 #include "drivers/sim/qtm/qtm_replies.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
@@ -25,7 +26,6 @@ using qualisys::PacketType;
 
 constexpr std::size_t kMaxClients = 10;
 constexpr std::size_t kMaxCommandSize = std::size_t{64} << 10;
-constexpr double kGhostDistance_m = 0.1;
 constexpr int kDefaultMinorVersion = 1;  // what QTM assumes before it is told
 
 struct Client {
@@ -93,7 +93,6 @@ class QtmServer::Loop {
     wake_.reset(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC));
     if (!wake_) return make_error(Errc::kIo, "cannot create an eventfd");
     log_.reserve(recording_.frames.size());
-    for (std::size_t i = 0; i < faults_.size(); ++i) faults_[i].shows = i;
     thread_ = std::thread([this] { run(); });
     return {};
   }
@@ -137,24 +136,21 @@ class QtmServer::Loop {
   bool set_marker_hidden(std::string_view name, bool hidden) {
     const std::lock_guard lock(mutex_);
     const auto i = index_of(name);
-    if (i) faults_[*i].hidden = hidden;
+    if (i) faults_.set_hidden(*i, hidden);
     return i.has_value();
   }
   bool swap_labels(std::string_view a, std::string_view b) {
     const std::lock_guard lock(mutex_);
     const auto i = index_of(a);
     const auto k = index_of(b);
-    if (!i || !k) return false;
-    std::swap(faults_[*i].shows, faults_[*k].shows);
-    return true;
+    if (i && k) faults_.swap(*i, *k);
+    return i && k;
   }
   bool set_ghost(std::string_view name, bool on) {
     const std::lock_guard lock(mutex_);
     const auto i = index_of(name);
-    if (!i) return false;
-    faults_[*i].ghost = on;
-    faults_[*i].p_W_ghost.reset();
-    return true;
+    if (i) faults_.set_ghost(*i, on);
+    return i.has_value();
   }
   bool rename_label(std::string_view from, std::string_view to) {
     const std::lock_guard lock(mutex_);
@@ -165,29 +161,10 @@ class QtmServer::Loop {
   }
 
  private:
-  /// What is wrong with one label.
-  struct LabelFault {
-    std::size_t shows{0};  // marker of the recording that the label follows
-    bool hidden{false};
-    bool ghost{false};
-    std::optional<Eigen::Vector3d> p_W_ghost;  // known from the first frame of the fault on in which the marker is seen
-  };
-
   std::optional<std::size_t> index_of(std::string_view name) const {
     const auto label = std::find(setup_.labels.begin(), setup_.labels.end(), name);
     if (label == setup_.labels.end()) return std::nullopt;
     return static_cast<std::size_t>(label - setup_.labels.begin());
-  }
-
-  /// What the label says in this frame, with its faults.
-  Marker measurement(LabelFault& fault, const std::vector<Marker>& frame) const {
-    if (fault.hidden) return {};
-    Marker marker = frame[fault.shows];
-    if (!fault.ghost) return marker;
-    if (!fault.p_W_ghost && marker.visible) fault.p_W_ghost = marker.p_W + Eigen::Vector3d(0.0, 0.0, kGhostDistance_m);
-    if (fault.p_W_ghost) marker.p_W = *fault.p_W_ghost;
-    marker.visible = fault.p_W_ghost.has_value();
-    return marker;
   }
 
   void wake() noexcept { ::eventfd_write(wake_.get(), 1); }
@@ -255,7 +232,7 @@ class QtmServer::Loop {
     packet_.frame_number = static_cast<std::uint32_t>(index + 1);
     packet_.markers.resize(faults_.size());
     for (std::size_t i = 0; i < faults_.size(); ++i) {
-      packet_.markers[i] = measurement(faults_[i], recording_.frames[index]);
+      packet_.markers[i] = faults_.measurement(i, recording_.frames[index]);
     }
     return qualisys::encode_data(packet_, components);
   }
@@ -363,7 +340,7 @@ class QtmServer::Loop {
 
   mutable std::mutex mutex_;  // guards all below
   QtmSetup setup_;
-  std::vector<LabelFault> faults_;                // by label
+  LabelFaults faults_;
   std::vector<std::unique_ptr<Client>> clients_;  // changed in size by the loop thread only
   Event state_;
   bool stop_{false};

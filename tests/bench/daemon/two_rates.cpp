@@ -89,7 +89,7 @@ int run() {
   auto edges = std::make_unique<Edges>();
   TrackerBaton tracker_baton(tracker);
   ArmBaton arm_baton(arm);
-  TrackerLoop tracker_loop(tracker_baton, models->hand_pose, models->predictor, *edges);
+  TrackerLoop tracker_loop(tracker_baton, models->hand_pose, models->monitor, models->predictor, *edges);
   ArmLoop arm_loop(arm_baton, tracker_baton, models->arm, {}, {}, *edges);
   FingerLoop finger_loop(models->fingers, models->filter, models->embodiment, {}, *edges);
   const auto tracker_info = tracker.connect();

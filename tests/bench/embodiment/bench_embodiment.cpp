@@ -25,6 +25,7 @@ void embodiment_step(benchmark::State& bench) {
   EmbodimentMapping mapping = mia();
   HandState state;
   state.valid = true;
+  state.quality.fill(FingerQuality::kOptimal);
   const auto p_P = mapping.finger_points(std::array<double, 3>{0.3, 0.6, 0.9});
   for (std::size_t f = 0; f < kFingers; ++f) {
     for (std::size_t i = 0; i < 2; ++i) {

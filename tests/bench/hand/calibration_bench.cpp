@@ -118,7 +118,7 @@ void print_real_recording() {
   const std::vector<MarkerFrame> first(frames.begin(), frames.begin() + 1000);
   const auto found = calibrate(first, paper_glove(), data, points, paper_calibration());
   if (!found) return;
-  const CalibratedGlove glove = apply(*found, paper_glove(), data, points);
+  const CalibratedGlove glove = apply(*found, paper_glove(), points);
   const HandModel manual(data, Shape::Zero(), points), calibrated(data, found->shape, glove.points);
   std::printf("\nreal recording, calibrated on frames 1-1000, mean distance in frames 1001-3000, tip / middle, mm\n");
   std::printf("  %-26s", "");

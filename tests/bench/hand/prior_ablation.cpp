@@ -99,7 +99,7 @@ int judge(const char* path) {
     std::fprintf(stderr, "%s\n", std::string(calibration.error().detail.view()).c_str());
     return 1;
   }
-  const CalibratedGlove glove = apply(*calibration, paper_glove(), data, points);
+  const CalibratedGlove glove = apply(*calibration, paper_glove(), points);
   const HandModel model(data, calibration->shape, glove.points);
   const HandModel manual(data, Shape::Zero(), points);
   const auto compare = [&](const char* name, const FingerEstimatorConfig& config) {
@@ -124,7 +124,9 @@ int judge(const char* path) {
   config = {};
   for (Vector9& weight : config.temporal_m_rad) weight.setZero();
   compare("without the temporal term", config);
-  compare("published problem, no prior", published);
+  config = published;
+  config.objective = FingerObjective::kPublished;
+  compare("published problem, no prior", config);
   return 0;
 }
 

@@ -30,6 +30,7 @@ double mean_residual_mm(const std::string& recording, const std::string& frames,
   const Finished result = run_program("embodyctl", arguments, 120);
   EXPECT_EQ(result.exit_code, kExitOk) << result.errors;
   const json object = json::parse(folder.read("figures.json"), nullptr, false);
+  EXPECT_EQ(object["markers_mm"].size(), 10U);
   double sum = 0.0;
   for (const auto& item : object["markers_mm"].items()) sum += item.value().get<double>();
   return sum / 10.0;
@@ -50,6 +51,7 @@ TEST(CalibrateCommand, WritesASubjectThatDaemonAndEvaluationRead) {
   EXPECT_EQ(loaded->markers.size(), 10U);
   const json figures = json::parse(folder.read("figures.json"), nullptr, false);
   ASSERT_TRUE(figures.is_object());
+  ASSERT_EQ(figures["shape"].size(), 10U);
   for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(figures["shape"][i].get<double>(), loaded->shape[i]) << i;
 
   folder.write("embody.toml", "schema = 1\n[subject]\nfile = \"subject.toml\"\n");
@@ -81,6 +83,15 @@ TEST(CalibrateCommand, RefusesWhatItCannotUseAndWritesNothing) {
   EXPECT_EQ(calibrate({kShipped, "--output", folder.file("none/subject.toml")}).exit_code, kExitFailed);
   const Finished few = calibrate({kShipped, "--frames", "1-2", "--output", output});
   EXPECT_EQ(few.exit_code, kExitFailed) << few.output;
+  EXPECT_EQ(calibrate({"--frames", "1-700", "--output", output}).exit_code, kExitUsage) << "there is no recording";
+  EXPECT_EQ(calibrate({kShipped, "--duration", "5", "--output", output}).exit_code, kExitUsage);
+  EXPECT_EQ(calibrate({kShipped, "--output", output, "--json", output}).exit_code, kExitUsage);
+  EXPECT_EQ(calibrate({kShipped, "--output", output, "--json", folder.file("none/figures.json")}).exit_code,
+            kExitFailed);
+  EXPECT_EQ(calibrate({kShipped, "--output", output, "--json", ""}).exit_code, kExitFailed);
+  folder.write("mine.json", "mine");
+  EXPECT_EQ(calibrate({kShipped, "--output", output, "--json", folder.file("mine.json")}).exit_code, kExitFailed);
+  EXPECT_EQ(folder.read("mine.json"), "mine");
   EXPECT_FALSE(std::filesystem::exists(output));
 }
 

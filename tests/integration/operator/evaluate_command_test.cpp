@@ -33,6 +33,7 @@ TEST(EvaluateCommand, JudgesTheShippedRecording) {
   ASSERT_TRUE(object.is_object());
   EXPECT_EQ(object["frames"], 400);
   EXPECT_EQ(object["recordings"].size(), 1U);
+  ASSERT_EQ(object["residual_mm"].size(), 5U);
   for (const auto& [finger, value] : object["residual_mm"].items()) EXPECT_LT(value.get<double>(), 2.0) << finger;
   EXPECT_EQ(object["frozen_fraction"], 0.0);
   EXPECT_LT(object["cost_ratio"]["p995"].get<double>(), 1.01);
@@ -69,6 +70,9 @@ TEST(EvaluateCommand, RefusesWrongUseWithOneSentence) {
       {{kShipped, "--fit", "elbow"}, kExitUsage},
       {{"/nowhere/none.tsv"}, kExitFailed},
       {{kConfig}, kExitFailed},
+      {{kShipped, "--json", "nodir/x"}, kExitFailed},
+      {{kShipped, "--json", ""}, kExitFailed},
+      {{kShipped, "--json", "/tmp"}, kExitFailed},
       {{kShipped, "--subject", kShipped}, kExitConfiguration},
       {{kShipped, "--subject", "/none"}, kExitConfiguration}};
   for (const auto& [arguments, exit_code] : cases) {

@@ -109,6 +109,15 @@ TEST(Landmarks, TheSenderEndsByItselfAndSaysWhatItSent) {
   EXPECT_NE(sent.output.find("\"sent\":1000"), std::string::npos) << sent.output;
 }
 
+TEST(Landmarks, TheSenderRefusesNumbersThatAreNone) {
+  for (const char* option : {"--rate", "--duration"}) {
+    for (const char* value : {"nan", "inf", "-1", "x"}) {
+      const Finished refused = run_program("embody-sim", {"landmarks", option, value});
+      EXPECT_EQ(refused.exit_code, kExitUsage) << option << " " << value << ": " << refused.errors;
+    }
+  }
+}
+
 TEST(Landmarks, ATableThatIsWrongIsNamedWithItsLine) {
   const TemporaryFolder folder;
   folder.write("wrong.csv", "frame,wrist_x_m\n0,1\n");

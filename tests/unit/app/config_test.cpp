@@ -256,10 +256,10 @@ TEST_F(ConfigFiles, AnIncludedFileIncludesNothing) {
 }
 
 TEST_F(ConfigFiles, WhatIsNoSmallRegularFileIsRefused) {
-  EXPECT_NE(load_message(folder_.string()).find("is not a regular file"), std::string::npos);
-  EXPECT_NE(load_message("/dev/zero").find("is not a regular file"), std::string::npos);
+  EXPECT_NE(load_message(folder_.string()).find("is not a file"), std::string::npos);
+  EXPECT_NE(load_message("/dev/zero").find("is not a file"), std::string::npos);
   EXPECT_NE(load_message((folder_ / "none.toml").string()).find("No such file"), std::string::npos);
-  EXPECT_NE(load_message(write("big.toml", std::string(kMaxConfigBytes + 1, '#'))).find("larger than"),
+  EXPECT_NE(load_message(write("big.toml", std::string(kMaxConfigBytes + 1, '#'))).find("has more than"),
             std::string::npos);
 }
 
@@ -307,12 +307,15 @@ TEST(SlowSensor, GetsTheTimesThatItsFramePeriodNeedsAndAFastOneChangesNothing) {
   EmbodyConfig config;
   EXPECT_EQ(print_toml(adapted_to_sensor(config)), print_toml(config)) << "a marker glove";
   config.tracker.driver = TrackerDriver::kLandmarks;
-  for (const double rate_hz : {1.0, 10.0, 30.0, 60.0, 120.0}) {
+  for (const double rate_hz : {10.0, 25.0, 30.0, 60.0, 120.0}) {
     config.tracker.landmarks.rate_hz = rate_hz;
     const EmbodyConfig adapted = adapted_to_sensor(config);
     EXPECT_GE(static_cast<double>(adapted.arm.resample_delay.count()), 1.5e3 / rate_hz);
     EXPECT_GE(static_cast<double>(adapted.safety.hold_after.count()), 3e3 / rate_hz);
+    EXPECT_LE(adapted.arm.resample_delay, milliseconds(200)) << "the range of the key";
+    EXPECT_LE(adapted.safety.hold_after, milliseconds(1000));
     EXPECT_EQ(adapted.safety.problem(), "");
+    EXPECT_EQ(print_toml(adapted_to_sensor(adapted)), print_toml(adapted)) << "once is enough";
   }
   config.tracker.landmarks.rate_hz = 120.0;
   EXPECT_EQ(print_toml(adapted_to_sensor(config)), print_toml(config));

@@ -23,6 +23,8 @@ EmbodimentMapping make(const EmbodimentConfig& config, const robot::RobotModel& 
 HandState state_of(const EmbodimentMapping& mapping, const Points& p_P) {
   HandState state;
   state.valid = true;
+  state.quality.fill(FingerQuality::kOptimal);
+  state.confidence.fill(1.0);
   for (std::size_t f = 0; f < kFingers; ++f) {
     for (std::size_t i = 0; i < 2; ++i) state.p_M[f][i] = mapping.X_PM().inverse() * p_P[f][i];
   }
@@ -269,6 +271,43 @@ TEST(EmbodimentMapping, AJointIsAsSureAsTheLeastSureFingerThatItFollows) {
   state.confidence = {0.1, 0.2, 0.3, 0.4, 0.5};
   mapping.step(state, target);
   EXPECT_EQ(target.joint_confidence[2], 0.3) << "nothing is kept from the last step";
+}
+
+TEST(EmbodimentMapping, FollowsOnlyFingersThatHaveAnEstimate) {
+  EmbodimentMapping mapping = make(test::mia_config());
+  FingerTarget whole, partial;
+  HandState state = state_of(mapping, mapping.finger_points(std::array<double, 3>{0.2, 0.4, 0.6}));
+  mapping.step(state, whole);
+  EXPECT_NEAR(whole.q_rad[2], 0.6, 1e-9);
+  // A glove without markers on ring and little finger: the flat fingers of the model must not hold the motor back.
+  for (const std::size_t unworn : {3, 4}) {
+    state.quality[unworn] = FingerQuality::kNone;
+    state.confidence[unworn] = 0.0;
+    for (auto& p_M : state.p_M[unworn]) p_M.setZero();
+  }
+  mapping.step(state, partial);
+  EXPECT_NEAR(partial.q_rad[2], 0.6, 1e-9);
+  EXPECT_EQ(partial.joint_confidence[2], 1.0) << "the middle finger is sure";
+  EXPECT_EQ(partial.residual_m[4], 0.0) << "nothing to compare";
+  state.quality[2] = FingerQuality::kNone;
+  state.p_M[2][0].setZero();
+  mapping.step(state, partial);
+  EXPECT_TRUE(partial.valid);
+  EXPECT_NEAR(partial.q_rad[2], 0.6, 1e-9) << "kept";
+  EXPECT_EQ(partial.joint_confidence[2], 0.0) << "and not to be followed";
+  EXPECT_EQ(partial.joint_confidence[1], 1.0);
+}
+
+TEST(EmbodimentMapping, CallsAConfidenceThatIsNoNumberUnsure) {
+  EmbodimentMapping mapping = make(test::mia_config());
+  HandState state = state_of(mapping, mapping.finger_points(std::array<double, 3>{0.2, 0.4, 0.6}));
+  for (const std::size_t finger : {2, 3, 4}) {
+    state.confidence = {1.0, 1.0, 1.0, 1.0, 1.0};
+    state.confidence[finger] = std::numeric_limits<double>::quiet_NaN();
+    FingerTarget target;
+    mapping.step(state, target);
+    EXPECT_EQ(target.joint_confidence[2], 0.0) << kFingerNames[finger];
+  }
 }
 
 TEST(EmbodimentMapping, StartsAtTheAngleNearestToZeroBeforeTheFirstValidHand) {

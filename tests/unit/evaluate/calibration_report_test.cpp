@@ -75,7 +75,7 @@ TEST(SubjectFile, GivesTheEstimatorsTheSameHandAsTheCalibrationItself) {
   const hand::Calibration calibration = random_calibration(random, nominal);
   config.subject = calibrated_subject(calibration, nominal.layout, config.subject);
   const OperatorModels from_file = models_of(config);
-  const hand::CalibratedGlove direct = hand::apply(calibration, nominal.layout, nominal.data, nominal.points);
+  const hand::CalibratedGlove direct = hand::apply(calibration, nominal.layout, nominal.points);
   const hand::HandModel expected(nominal.data, calibration.shape, direct.points);
   const hand::HandModel model = from_file.hand_model();
   EXPECT_TRUE(from_file.X_HM.isApprox(calibration.X_HM, 1e-12));

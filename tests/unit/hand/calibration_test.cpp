@@ -184,7 +184,7 @@ TEST(Calibration, AppliedGivesEachMarkerAPointOfItsOwnAndLeavesTheFirstTwo) {
   calibration.back_edges_m = {0.05, 0.04, 0.03};
   calibration.markers.push_back({5, Finger::kIndex, 3, Vector3d(-.01, .02, .003), Vector3d::Zero(), 0.0, false});
   calibration.markers.push_back({6, Finger::kThumb, 14, Vector3d::Ones(), Vector3d::Zero(), 0.0, false});  // not worn
-  const CalibratedGlove applied = apply(calibration, paper_glove(), data, points);
+  const CalibratedGlove applied = apply(calibration, paper_glove(), points);
   EXPECT_EQ(applied.glove.back_edges_m, calibration.back_edges_m);
   ASSERT_TRUE(check_points(data, applied.points).ok());
   for (const FingerMarker& marker : applied.glove.finger_markers) {
@@ -196,6 +196,28 @@ TEST(Calibration, AppliedGivesEachMarkerAPointOfItsOwnAndLeavesTheFirstTwo) {
   EXPECT_EQ(applied.points[1][2].offset_m, calibration.markers[0].offset_m);
   for (std::size_t f = 0; f < kFingers; ++f) {
     for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(applied.points[f][i].offset_m, points[f][i].offset_m);
+  }
+}
+
+TEST(Calibration, AppliedReplacesThePointsOfItsOwnThatAGloveHas) {
+  HandPoints points = default_points(right_hand());
+  GloveLayout glove = paper_glove();
+  glove.finger_markers.clear();
+  Calibration calibration;
+  for (std::size_t i = 0; i < kMaxFingerPoints - 2; ++i) {  // as many as a finger can carry
+    HandPoint point;
+    point.joint = 1;
+    points[1].push_back(point);
+    glove.finger_markers.push_back({Finger::kIndex, 2 + i, 3 + i});
+    calibration.markers.push_back(
+        {3 + i, Finger::kIndex, 3, Vector3d::Constant(.001 * static_cast<double>(i)), Vector3d::Zero(), 0.0, false});
+  }
+  const CalibratedGlove applied = apply(calibration, glove, points);
+  ASSERT_EQ(applied.points[1].size(), kMaxFingerPoints);
+  for (std::size_t i = 0; i < kMaxFingerPoints - 2; ++i) {
+    EXPECT_EQ(applied.glove.finger_markers[i].point, 2 + i);
+    EXPECT_EQ(applied.points[1][2 + i].joint, 3U);
+    EXPECT_EQ(applied.points[1][2 + i].offset_m, calibration.markers[i].offset_m);
   }
 }
 

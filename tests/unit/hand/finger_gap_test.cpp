@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/hand/finger_estimator.hpp"
+#include "core/hand/hand_data.hpp"
 #include "core/hand/hand_pose_estimator.hpp"
 #include "core/hand/synthetic_motion.hpp"
 #include "tests/unit/hand/real_recording.hpp"
@@ -63,13 +64,56 @@ double largest_transition_step(const std::vector<MarkerFrame>& frames, std::size
   double largest = 0.0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     fingers.step(frames[k], hand.step(frames[k]), state);
+    bool changed = state.visible_markers[finger] != last.visible_markers[finger];  // some are believed later than seen
     for (std::size_t slot = 3 + 2 * finger; k > 0 && slot < 5 + 2 * finger; ++slot) {
-      if (frames[k].markers[slot].visible == frames[k - 1].markers[slot].visible) continue;
-      largest = std::max(largest, joint_step(last, state, finger));
+      changed |= frames[k].markers[slot].visible != frames[k - 1].markers[slot].visible;
     }
+    if (k > 0 && changed) largest = std::max(largest, joint_step(last, state, finger));
     last = state;
   }
   return largest;
+}
+
+/// A frame that shows the tip of the index finger only, bent as `q`.
+MarkerFrame tip_only(const HandModel& model, const Vector9& q, std::uint64_t number) {
+  constexpr std::size_t kIndexTip = 5;
+  MarkerFrame frame;
+  frame.frame_number = number;
+  frame.t_capture = TimePoint{kPeriod * number};
+  frame.count = 13;
+  frame.markers[kIndexTip] = {model.finger_points(Finger::kIndex, q)[0], true};
+  return frame;
+}
+
+// A tip on the way between knuckle and full reach is reached with the middle joint bent either way. An overstretched
+// finger that bends must not stay on the wrong side; the way back is no jump.
+TEST(FingerFold, OfAFingerThatWasOverstretchedIsFoundAgain) {
+  test::RandomValues random(61);
+  HandPose here;
+  here.valid = true;
+  for (const Side side : {Side::kRight, Side::kLeft}) {
+    const HandData data = builtin_hand(Skeleton::kBoneLengths, side);
+    const HandModel model(data, Shape::Zero(), default_points(data));
+    const double sign = side == Side::kRight ? 1.0 : -1.0;
+    for (int i = 0; i < 20; ++i) {
+      FingerEstimator fingers(model, paper_glove(), {});
+      Vector9 from = Vector9::Zero(), to = Vector9::Zero();
+      from(2) = sign * 1.2, from(5) = -sign * .1, from(8) = -sign * .15;
+      to(2) = sign * random(.3, .6), to(5) = sign * random(.7, 1.1), to(8) = to(5) * 2.0 / 3.0;
+      HandState last, state;
+      std::uint64_t number = 1;
+      for (int k = 0; k < 20; ++k) fingers.step(tip_only(model, from, number++), here, last);
+      constexpr int kMoving = 40;
+      for (int k = 0; k < kMoving + 60; ++k) {
+        const double share = std::min(1.0, static_cast<double>(k) / kMoving);
+        fingers.step(tip_only(model, (1.0 - share) * from + share * to, number++), here, state);
+        ASSERT_LE(joint_step(last, state, 1), 5.0 * kDegree + 1e-9) << i << " " << k;
+        last = state;
+      }
+      EXPECT_NEAR(sign * angles(state, 1)(5), sign * to(5), .25) << i;
+      EXPECT_LT(state.residual_m[1], 2e-3) << i;
+    }
+  }
 }
 
 TEST(FingerGaps, NeverMakeAJointJumpByMoreThanFiveDegrees) {

@@ -284,6 +284,29 @@ TEST(MarkerGuard, SaysNothingIsSeenWithoutAHandPose) {
   EXPECT_TRUE(checked.usable(kThumbTip));
 }
 
+TEST(MarkerGuard, ForgetsNoMoreOverALostHandPoseThanOverHiddenMarkers) {
+  const Frames& whole = recordings()[0];
+  for (const std::size_t length : {5, 20, 50}) {
+    std::size_t without_pose = 0, hidden = 0;
+    for (std::size_t start = 200; start + length + 100 < whole.size(); start += 60) {
+      for (const bool back : {true, false}) {
+        Frames frames(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(start + length + 100));
+        for (std::size_t slot = back ? 1 : 3; slot < (back ? 2U : 13U); ++slot) {
+          test::hide(frames, slot, start, length);
+        }
+        test::GuardedHand hand(true);
+        HandState state;
+        for (std::size_t k = 0; k < frames.size(); ++k) {
+          hand.step(frames[k], state);
+          if (k < start + length) continue;
+          for (std::size_t slot = 3; slot < 13; ++slot) (back ? without_pose : hidden) += !hand.markers().usable(slot);
+        }
+      }
+    }
+    EXPECT_EQ(without_pose, hidden) << "marker-frames not believed after gaps of " << length << " frames";
+  }
+}
+
 TEST(MarkerGuard, DoesNotMindFrameNumbersClocksOrRepeatedFrames) {
   Frames frames = recordings()[0];
   Frames odd;

@@ -251,7 +251,7 @@ TEST(Landmarks, GiveBackTheFingersThatMadeThem) {
     const FingerAngles q = random_grip(random);
     const Pose X_WM = random_pose(random);
     PalmPoseEstimator palm(model);
-    FingerEstimator fingers(model, landmark_layout(), FingerEstimatorConfig{});
+    FingerEstimator fingers(model, landmark_layout(), for_landmarks({}));
     HandState state;
     MarkerFrame frame = frame_of(model, X_WM, q);
     for (int k = 0; k < 30; ++k) {  // the prior on steps lets go
@@ -276,7 +276,7 @@ TEST(Landmarks, ALandmarkThatIsLessCertainPullsItsFingerLess) {
   const auto angle_rad = [&](float confidence) {
     frame.markers[8].confidence = confidence;
     PalmPoseEstimator palm(model);
-    FingerEstimator fingers(model, landmark_layout(), FingerEstimatorConfig{});
+    FingerEstimator fingers(model, landmark_layout(), for_landmarks({}));
     HandState state;
     for (int k = 0; k < 30; ++k) fingers.step(frame, palm.step(frame), state);
     return (landmark_positions(model, state.q_rad)[8] - landmark_positions(model, FingerAngles::Zero())[8]).norm();

@@ -36,7 +36,7 @@ const Subject* subject() {
     const auto found = calibrate(first, paper_glove(), data, points, paper_calibration());
     EXPECT_TRUE(found.ok()) << found.error().detail.view();
     if (!found) return nullptr;
-    const CalibratedGlove glove = apply(*found, paper_glove(), data, points);
+    const CalibratedGlove glove = apply(*found, paper_glove(), points);
     return std::make_unique<Subject>(
         Subject{std::move(frames), *found, glove, HandModel(data, found->shape, glove.points)});
   }();

@@ -14,7 +14,7 @@ class TrackerBench {
  public:
   explicit TrackerBench(const teleop::PosePredictorConfig& predictor = {})
       : baton(tracker),
-        loop(baton, hand::HandPoseEstimator(hand::paper_glove(), hand::paper_calibration()),
+        loop(baton, hand::HandPoseEstimator(hand::paper_glove(), hand::paper_calibration()), teleop::PoseMonitor(),
              teleop::PosePredictor(predictor), edges) {
     tracker.fd = ready.get();
   }

@@ -171,6 +171,9 @@ class PickleTest(unittest.TestCase):
         whole = pickle.dumps(as_published(synthetic_model()), 2)
         cases = [b"", b"no pickle", whole[: len(whole) // 2], pickle.dumps([1, 2, 3]), pickle.dumps({}),
                  pickle.dumps(dict(synthetic_model(), f=numpy.array(["a", "b"]))),
+                 pickle.dumps(dict(synthetic_model(), f=["a", "b"])),
+                 pickle.dumps(dict(synthetic_model(), J_regressor=with_state(csc_matrix, data=numpy.zeros(3),
+                                                                             indptr=[float("inf")] * 17))),
                  pickle.dumps(dict(synthetic_model(), weights=numpy.array([{}, None], dtype=object))),
                  pickle.dumps(dict(synthetic_model(), J_regressor=with_state(csc_matrix, data=numpy.zeros(3)))),
                  pickle.dumps(dict(synthetic_model(), shapedirs=with_state(Select, a=numpy.zeros(3))))]
