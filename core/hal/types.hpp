@@ -29,6 +29,7 @@ inline constexpr std::array<std::size_t, kFingers> kFingerOffset{36, 0, 9, 27, 1
 
 /// Which hand of the person.
 enum class Side : std::uint8_t { kRight, kLeft };
+inline constexpr std::array<const char*, 2> kSideNames{"right", "left"};
 
 struct Marker {
   Eigen::Vector3d p_W{0.0, 0.0, 0.0};  ///< m; meaningless unless visible
@@ -89,6 +90,8 @@ struct HandState {
       Eigen::Matrix<double, static_cast<int>(kHandAngles), 1>::Zero()};  ///< axis-angle, MANO's order
   /// Model points that correspond to the markers, in M (m): [finger][0] tip, [finger][1] middle.
   std::array<std::array<Eigen::Vector3d, 2>, kFingers> p_M = zero_points();
+  /// Last phalanx of each finger in M, m: [0] its joint, [1] its tip.
+  std::array<std::array<Eigen::Vector3d, 2>, kFingers> distal_M = zero_points();
   std::array<double, kFingers> residual_m{};  ///< mean distance of visible markers to their model points
   std::array<std::uint8_t, kFingers> visible_markers{};
   std::array<FingerQuality, kFingers> quality{};

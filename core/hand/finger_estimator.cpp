@@ -232,6 +232,7 @@ void FingerEstimator::solve(std::size_t finger, HandState& state) noexcept {
   memory.residual_m = distance_m / static_cast<double>(problem.markers.size());
   state.q_rad.segment<9>(static_cast<Index>(kFingerOffset[finger])) = solution.q_rad;
   state.p_M[finger] = {model_.point(problem.finger, 0, memory.chain), model_.point(problem.finger, 1, memory.chain)};
+  state.distal_M[finger] = model_.distal(problem.finger, memory.chain);
   state.residual_m[finger] = memory.residual_m;
   state.quality[finger] = solution.status == SolveStatus::kCapped ? FingerQuality::kCapped
                           : at_range                              ? FingerQuality::kAtLimit
@@ -323,6 +324,7 @@ void FingerEstimator::hold(std::size_t finger, Duration dt, HandState& state) no
   const auto id = static_cast<Finger>(finger);
   memory.chain = model_.chain(id, memory.q_rad);
   state.p_M[finger] = {model_.point(id, 0, memory.chain), model_.point(id, 1, memory.chain)};
+  state.distal_M[finger] = model_.distal(id, memory.chain);
   state.residual_m[finger] = memory.residual_m;
   state.quality[finger] = !memory.known ? FingerQuality::kNone : lost ? FingerQuality::kLost : FingerQuality::kHeld;
 }

@@ -217,6 +217,11 @@ void HandModel::add_curvature(Finger finger, std::size_t index, const FingerChai
   }
 }
 
+std::array<Vector3d, 2> HandModel::distal(Finger finger, const FingerChain& chain) const noexcept {
+  const Vector3d along_J = tips_[static_cast<std::size_t>(finger)] - joints_[first_joint(finger) + 2];
+  return {chain.centres_M[2], chain.centres_M[2] + chain.R_MJ[2] * along_J};
+}
+
 std::array<Vector3d, 2> HandModel::finger_points(Finger finger, const Vector9& q_rad) const noexcept {
   const FingerChain at_q = chain(finger, q_rad);
   return {point(finger, 0, at_q), point(finger, 1, at_q)};

@@ -72,6 +72,8 @@ class HandModel {
   void add_curvature(Finger finger, std::size_t point, const FingerChain& chain, const Eigen::Vector3d& c,
                      Matrix9& curvature) const noexcept;
 
+  /// Last phalanx in M, m: [0] its joint, [1] the end of the fleshy tip.
+  [[nodiscard]] std::array<Eigen::Vector3d, 2> distal(Finger finger, const FingerChain& chain) const noexcept;
   /// [0] tip, [1] middle, m.
   [[nodiscard]] std::array<Eigen::Vector3d, 2> finger_points(Finger finger, const Vector9& q_rad) const noexcept;
 

@@ -50,7 +50,10 @@ void HandStateFilter::step(HandState& state) noexcept {
     auto q_rad = state.q_rad.segment<static_cast<int>(kFingerAngles)>(offset(f));
     if (dt > Duration{0}) advance(tracks_[f], q_rad, to_seconds(dt), lag_[f]);
     q_rad = tracks_[f].q_out_rad;
-    state.p_M[f] = model_.finger_points(static_cast<Finger>(f), tracks_[f].q_out_rad);
+    const auto finger = static_cast<Finger>(f);
+    const FingerChain chain = model_.chain(finger, tracks_[f].q_out_rad);
+    state.p_M[f] = {model_.point(finger, 0, chain), model_.point(finger, 1, chain)};
+    state.distal_M[f] = model_.distal(finger, chain);
   }
 }
 

@@ -21,6 +21,31 @@ Result<std::size_t> find_independent(const RobotModel& model, const std::string&
   return *joint;
 }
 
+/// The knots, checked against each other and against the limits of the joint.
+Result<Coupling> make_coupling(const NamedCoupling& named, std::size_t motor, const Joint& joint) {
+  constexpr double kRounding = 1e-6;  // of numbers in files
+  if (named.knots.size() < 2 || named.knots.size() > kMaxKnots) {
+    return make_error(Errc::kInvalidArgument, "robot hand: the coupling of joint '%.60s' needs 2 to %zu knots",
+                      named.joint.c_str(), kMaxKnots);
+  }
+  Coupling coupling;
+  coupling.motor = motor;
+  for (const Knot& knot : named.knots) {
+    const bool increasing = coupling.knots.empty() || knot.motor > coupling.knots[coupling.knots.size() - 1].motor;
+    if (!std::isfinite(knot.motor) || !std::isfinite(knot.joint) || !increasing) {
+      return make_error(Errc::kInvalidArgument, "robot hand: the coupling of joint '%.60s': motor_rad must increase",
+                        named.joint.c_str());
+    }
+    if (!(knot.joint >= joint.lower - kRounding && knot.joint <= joint.upper + kRounding)) {
+      return make_error(Errc::kInvalidArgument,
+                        "robot hand: the coupling of joint '%.60s' leaves the joint's limits (%g)", named.joint.c_str(),
+                        knot.joint);
+    }
+    coupling.knots.push_back(knot);
+  }
+  return coupling;
+}
+
 math::Pose joint_motion(const Joint& joint, double q) noexcept {
   math::Pose X = math::Pose::Identity();
   if (joint.type == JointType::kPrismatic) {
@@ -51,11 +76,28 @@ Result<HandKinematics> HandKinematics::create(const RobotModel& model, const Han
     if (joint) named[*joint] = true;
     return joint;
   };
-  for (const std::string& name : spec.motors) {
-    const Result<std::size_t> joint = claim(name);
+  hand.motor_count_ = spec.motors.size();
+  std::vector<bool> moves(spec.motors.size(), false);
+  for (const NamedCoupling& named_coupling : spec.couplings) {
+    const Result<std::size_t> joint = claim(named_coupling.joint);
     if (!joint) return joint.error();
-    hand.couplings_[*joint] = {hand.motor_joints_.size(), 1.0, 0.0};
-    hand.motor_joints_.push_back(*joint);
+    const auto motor = std::find(spec.motors.begin(), spec.motors.end(), named_coupling.motor);
+    if (motor == spec.motors.end()) return unknown("motor", named_coupling.motor);
+    const auto m = static_cast<std::size_t>(motor - spec.motors.begin());
+    const Result<Coupling> coupling = make_coupling(named_coupling, m, model.joints[*joint]);
+    if (!coupling) return coupling.error();
+    hand.couplings_[*joint] = *coupling;
+    moves[m] = true;
+  }
+  for (std::size_t m = 0; m < spec.motors.size(); ++m) {
+    if (std::count(spec.motors.begin(), spec.motors.end(), spec.motors[m]) > 1) {
+      return make_error(Errc::kInvalidArgument, "robot hand: motor '%.60s' is named twice", spec.motors[m].c_str());
+    }
+    const auto own = model.find_joint(spec.motors[m]);
+    if (moves[m] && (!own || named[*own])) continue;  // moves other joints, or its own through knots
+    const Result<std::size_t> joint = claim(spec.motors[m]);
+    if (!joint) return joint.error();
+    hand.couplings_[*joint] = {m, 1.0, 0.0, {}};
   }
   for (const NamedAngle& fixed : spec.fixed_joints) {
     const Result<std::size_t> joint = claim(fixed.joint);
@@ -67,9 +109,7 @@ Result<HandKinematics> HandKinematics::create(const RobotModel& model, const Han
   for (std::size_t i = 0; i < model.joints.size(); ++i) {
     if (!model.joints[i].mimic) continue;
     const Mimic& mimic = *model.joints[i].mimic;
-    const Coupling& leader = hand.couplings_[mimic.joint];
-    hand.couplings_[i] = {leader.motor, mimic.multiplier * leader.multiplier,
-                          mimic.multiplier * leader.offset + mimic.offset};
+    hand.couplings_[i] = hand.couplings_[mimic.joint].scaled(mimic.multiplier, mimic.offset);
   }
   for (const NamedAngle& zero : spec.zero_offsets) {
     const auto joint = model.find_joint(zero.joint);
@@ -95,7 +135,8 @@ Result<HandKinematics> HandKinematics::create(const RobotModel& model, const Han
 void HandKinematics::joint_angles(std::span<const double> r, std::span<double> q) const noexcept {
   for (std::size_t i = 0; i < couplings_.size(); ++i) {
     const Coupling& c = couplings_[i];
-    q[i] = c.motor == kNoIndex ? c.offset : c.multiplier * r[c.motor] + c.offset;
+    q[i] = c.value(c.motor == kNoIndex ? 0.0 : r[c.motor]);
+    if (c.motor != kNoIndex) q[i] = std::clamp(q[i], model_.joints[i].lower, model_.joints[i].upper);
   }
 }
 
@@ -105,6 +146,9 @@ void HandKinematics::update(std::span<const double> r, Workspace& workspace) con
   workspace.X_PL[0] = math::Pose::Identity();
   for (std::size_t i = 0; i < couplings_.size(); ++i) {
     const Joint& joint = model_.joints[i];
+    const Coupling& c = couplings_[i];
+    const bool free = c.motor != kNoIndex && q[i] == c.value(r[c.motor]);  // not stopped by a limit
+    workspace.slopes[i] = free ? c.slope(r[c.motor]) : 0.0;
     workspace.X_PL[joint.child_link] =
         workspace.X_PL[joint.parent_link] * joint.X_PC * joint_motion(joint, q[i] + zero_offsets_[i]);
   }
@@ -123,7 +167,7 @@ HandKinematics::Jacobian HandKinematics::jacobian(std::size_t point, const Works
     const Eigen::Vector3d axis = X_PC.linear() * joint.axis;
     const Eigen::Vector3d slope =
         joint.type == JointType::kPrismatic ? axis : axis.cross(p_P - X_PC.translation()).eval();
-    J.col(static_cast<int>(couplings_[j].motor)) += couplings_[j].multiplier * slope;
+    J.col(static_cast<int>(couplings_[j].motor)) += workspace.slopes[j] * slope;
   }
   return J;
 }

@@ -8,6 +8,7 @@
 
 #include "core/base/result.hpp"
 #include "core/math/pose.hpp"
+#include "core/robot/coupling.hpp"
 #include "core/robot/urdf_model.hpp"
 
 namespace embody::robot {
@@ -22,6 +23,13 @@ struct NamedAngle {
   double angle_rad{0.0};
 };
 
+/// The joint of that name follows a motor through knots (Coupling).
+struct NamedCoupling {
+  std::string joint;
+  std::string motor;
+  std::vector<Knot> knots;
+};
+
 /// A point fixed to a link.
 struct LinkPoint {
   std::string link;
@@ -30,17 +38,12 @@ struct LinkPoint {
 
 /// Which joints move, which stand still, and which points are of interest.
 struct HandKinematicsSpec {
-  std::vector<std::string> motors;       ///< independent joints, in the order of the motor coordinates
+  std::vector<std::string> motors;  ///< joints of that name, or names that `couplings` use; order of the coordinates
   std::vector<NamedAngle> fixed_joints;  ///< independent joints that stand still; those not named stand at 0
   std::vector<NamedAngle> zero_offsets;  ///< geometry angle = joint angle + offset
   std::vector<LinkPoint> points;
-};
-
-/// How one joint follows the motors: q = multiplier * r[motor] + offset, or q = offset when `motor` is kNoIndex.
-struct Coupling {
-  std::size_t motor{kNoIndex};
-  double multiplier{0.0};
-  double offset{0.0};
+  /// Of independent joints that do not follow the motor of their name one to one.
+  std::vector<NamedCoupling> couplings;
 };
 
 /// Immutable after create(). `r` are the motor coordinates (rad, or m for prismatic joints), P the root link.
@@ -52,25 +55,28 @@ class HandKinematics {
   /// Poses of one configuration; the caller owns it, so that the kinematics stay immutable.
   struct Workspace {
     std::array<math::Pose, kMaxHandLinks> X_PL{};  ///< by link
+    std::array<double, kMaxHandLinks> slopes{};    ///< by joint: dq/dr of its motor
   };
 
-  /// Errors: kNotFound (link or joint name), kInvalidArgument (a motor or fixed joint that is fixed, repeated or
-  /// mimics another; not finite), kUnsupported (more than the maxima above).
+  /// Errors: kNotFound (link, joint or motor name), kInvalidArgument (a motor, coupled or fixed joint that is fixed,
+  /// repeated or mimics another; knots that do not increase or leave the joint's limits; not finite), kUnsupported
+  /// (more than the maxima above).
   [[nodiscard]] static Result<HandKinematics> create(const RobotModel& model, const HandKinematicsSpec& spec);
 
   [[nodiscard]] const RobotModel& model() const noexcept { return model_; }
-  [[nodiscard]] std::size_t motor_count() const noexcept { return motor_joints_.size(); }
+  [[nodiscard]] std::size_t motor_count() const noexcept { return motor_count_; }
   [[nodiscard]] std::size_t point_count() const noexcept { return points_.size(); }
   /// By joint of the model.
   [[nodiscard]] std::span<const Coupling> couplings() const noexcept { return couplings_; }
-  /// Index of the motor's joint in the model.
-  [[nodiscard]] std::size_t motor_joint(std::size_t motor) const noexcept { return motor_joints_[motor]; }
+  /// Geometry angle less joint angle, by joint of the model.
+  [[nodiscard]] std::span<const double> zero_offsets() const noexcept { return zero_offsets_; }
   /// The moving joints between the root and the point whose angle depends on a motor, root first.
   [[nodiscard]] std::span<const std::size_t> point_joints(std::size_t point) const noexcept {
     return points_[point].joints;
   }
 
-  /// Angles of all joints of the model (mimics, fixed values, without zero offsets), as a URDF viewer takes them.
+  /// Angles of all joints of the model (couplings, mimics, fixed values, without zero offsets), as a URDF viewer takes
+  /// them; within the URDF's limits whatever `r` is.
   /// @pre r.size() >= motor_count(), q.size() >= model().joints.size()
   void joint_angles(std::span<const double> r, std::span<double> q) const noexcept;
   /// Computes the poses of all links. O(joints). @pre r.size() >= motor_count()
@@ -90,7 +96,7 @@ class HandKinematics {
   HandKinematics() = default;
 
   RobotModel model_;
-  std::vector<std::size_t> motor_joints_;
+  std::size_t motor_count_{0};
   std::vector<Coupling> couplings_;
   std::vector<double> zero_offsets_;  // by joint
   std::vector<Point> points_;

@@ -32,6 +32,9 @@ inline constexpr std::size_t kMaxConfigBytes = std::size_t{64} * 1024;  ///< of 
 /// load_config().
 [[nodiscard]] Result<SubjectConfig> load_subject(const std::filesystem::path& path);
 
+/// A hand file: by its path, or by the name of one that is shipped ("mia"). Errors as load_config(), kNotFound.
+[[nodiscard]] Result<HandConfig> load_hand(const std::string& name);
+
 /// The text of a subject file: load_subject() of it gives the same values.
 [[nodiscard]] std::string print_toml(const SubjectConfig& subject);
 

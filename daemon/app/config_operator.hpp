@@ -88,8 +88,6 @@ struct GloveConfig {
 enum class Skeleton : std::uint8_t { kA, kB };
 inline constexpr std::array<const char*, 2> kSkeletonNames{"A", "B"};
 
-inline constexpr std::array<const char*, 2> kSideNames{"right", "left"};
-
 /// Where a calibration found one marker of the glove on this person.
 struct MarkerPlaceConfig {
   std::string marker;

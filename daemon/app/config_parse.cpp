@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
 #include <type_traits>
 
 #include "daemon/app/config_file.hpp"
@@ -364,7 +365,11 @@ Result<EmbodyConfig> parse_config(std::string_view text, const std::string& name
   return config;
 }
 
-Result<SubjectConfig> load_subject(const fs::path& path) {
+namespace {
+
+/// One of the files that a configuration includes, on its own.
+template <class T>
+Result<T> load_part(const fs::path& path) {
   const auto content = read_file(path);
   if (!content) return content.error();
   std::error_code ignored;
@@ -372,13 +377,37 @@ Result<SubjectConfig> load_subject(const fs::path& path) {
   const Source source{path.string(), fs::absolute(path, ignored).parent_path(), true};
   const toml::table table = parse_text(*content, source, load);
   check_included_schema(table, source, load);
-  SubjectConfig subject;
-  if (load.problems.empty()) Reader<SubjectConfig>(subject, table, "", source, load).run();
+  T part;
+  if (load.problems.empty()) Reader<T>(part, table, "", source, load).run();
   if (load.problems.empty()) {
-    if (const std::string why = subject.problem(); !why.empty()) load.problems.push_back({source.name, why});
+    if (const std::string why = part.problem(); !why.empty()) load.problems.push_back({source.name, why});
   }
   if (!load.problems.empty()) return to_error(load);
-  return subject;
+  return part;
+}
+
+}  // namespace
+
+Result<SubjectConfig> load_subject(const fs::path& path) {
+  return load_part<SubjectConfig>(path);
+}
+
+Result<HandConfig> load_hand(const std::string& name) {
+  const bool is_file = name.find('/') != std::string::npos || name.ends_with(".toml");
+  if (is_file) return load_part<HandConfig>(name);
+  std::set<std::string> shipped;
+  for (const fs::path& folder : data_folders()) {
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(folder / "hands", ignored)) {
+      if (entry.path().extension() != ".toml") continue;
+      if (entry.path().stem() == name) return load_part<HandConfig>(entry.path());
+      shipped.insert(entry.path().stem());
+    }
+  }
+  std::string names;
+  for (const std::string& hand : shipped) names += (names.empty() ? "" : ", ") + hand;
+  return make_error(Errc::kNotFound, "there is no hand \"%.60s\"; shipped are %s; or name a file (.toml)", name.c_str(),
+                    names.c_str());
 }
 
 }  // namespace embody::config

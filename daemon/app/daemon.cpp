@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <thread>
 #include <tuple>
 
@@ -28,8 +29,24 @@ std::unique_ptr<HandDriver> make_hand(const config::HandConfig& config) {
   mia::MiaConfig mia;
   mia.device = config.device;
   mia.speed_percent = config.speed_percent;
-  mia.lateral_thumb = config.embodiment.thumb_mode == ThumbMode::kLateral;
   return std::make_unique<mia::MiaHand>(mia);
+}
+
+/// Does the hand's file belong to the driver, and to the operator's hand?
+Status check_hand(const config::EmbodyConfig& config) {
+  const EmbodimentConfig& hand = config.hand.embodiment;
+  if (!std::equal(hand.motors.begin(), hand.motors.end(), mia::kJointNames.begin(), mia::kJointNames.end())) {
+    return make_error(Errc::kInvalidArgument,
+                      "[hand] driver \"mia\" moves the motors %s, %s and %s; the hand file of \"%.40s\" has others",
+                      mia::kJointNames[0], mia::kJointNames[1], mia::kJointNames[2], hand.name.c_str());
+  }
+  if (hand.side != config.subject.side) {
+    const auto name = [](Side side) { return kSideNames[static_cast<std::size_t>(side)]; };
+    return make_error(Errc::kInvalidArgument,
+                      "[subject] side is %s, but [hand] side is %s: a hand follows its own kind",
+                      name(config.subject.side), name(hand.side));
+  }
+  return {};
 }
 
 safety::ModeConfig mode_config(const config::SafetyConfig& config) {
@@ -79,6 +96,7 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& confi
     return make_error(Errc::kInvalidArgument, "[%s] driver = \"%s\" is unknown; this version has \"%s\"", key,
                       name->c_str(), known);
   }
+  if (const Status fits = check_hand(config); !fits) return fits.error();
   Result<Models> models = make_models(config);
   if (!models) return models.error();
   embody::DdsConfig dds;
@@ -86,7 +104,7 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& confi
   dds.domain = config.dds.domain;
   dds.interface = config.dds.interface;
   dds.networks = config.dds.networks;
-  dds.side = config::kSideNames[static_cast<std::size_t>(config.subject.side)];
+  dds.side = kSideNames[static_cast<std::size_t>(config.subject.side)];
   Result<DdsPublisher> publisher = DdsPublisher::create(dds);
   if (!publisher) return publisher.error();
   return std::unique_ptr<Daemon>(new Daemon(config, *models, make_tracker(config), make_arm(config.arm),

@@ -1,5 +1,7 @@
 #include "daemon/app/models.hpp"
 
+#include "core/embodiment/mirror_config.hpp"
+#include "core/robot/mirror.hpp"
 #include "core/robot/urdf_model.hpp"
 #include "drivers/transport/file.hpp"
 
@@ -43,16 +45,6 @@ teleop::PosePredictor make_predictor(const config::FilterConfig& config) {
   return teleop::PosePredictor(predictor);
 }
 
-Result<EmbodimentMapping> make_embodiment(const EmbodimentConfig& hand) {
-  const auto text = transport::load_text(hand.urdf, robot::kMaxUrdfBytes, "a robot model (.urdf)");
-  if (!text) return text.error();
-  const Result<robot::RobotModel> model = robot::load_urdf(*text);
-  if (!model) {
-    return make_error(model.error().code, "%s: %s", hand.urdf.c_str(), model.error().detail.c_str());
-  }
-  return EmbodimentMapping::create(*model, hand);
-}
-
 teleop::ArmControllerConfig make_arm(const config::EmbodyConfig& config, const Pose& X_PM) {
   const config::ArmConfig& arm = config.arm;
   teleop::ArmControllerConfig controller;
@@ -74,6 +66,23 @@ teleop::ArmControllerConfig make_arm(const config::EmbodyConfig& config, const P
 }
 
 }  // namespace
+
+Result<robot::RobotModel> load_hand_model(const EmbodimentConfig& hand) {
+  const auto text = transport::load_text(hand.urdf, robot::kMaxUrdfBytes, "a robot model (.urdf)");
+  if (!text) return text.error();
+  Result<robot::RobotModel> model = robot::load_urdf(*text);
+  if (!model) {
+    return make_error(model.error().code, "%s: %s", hand.urdf.c_str(), model.error().detail.c_str());
+  }
+  if (hand.side != hand.file_side) return robot::mirrored(*model);
+  return model;
+}
+
+Result<EmbodimentMapping> make_embodiment(const EmbodimentConfig& hand) {
+  const Result<robot::RobotModel> model = load_hand_model(hand);
+  if (!model) return model.error();
+  return EmbodimentMapping::create(*model, hand.side != hand.file_side ? mirrored(hand) : hand);
+}
 
 Result<Models> make_models(const config::EmbodyConfig& config) {
   const Result<OperatorModels> models = make_operator_models(config);

@@ -22,6 +22,12 @@ struct Models {
   teleop::ArmControllerConfig arm;
 };
 
+/// The robot hand's URDF, mirrored when the hand that is driven is of the other side. Errors: of the file (its name is
+/// in the sentence), kMalformed, kUnsupported.
+[[nodiscard]] Result<robot::RobotModel> load_hand_model(const EmbodimentConfig& hand);
+/// The mapping onto that hand. Errors as load_hand_model() and EmbodimentMapping::create().
+[[nodiscard]] Result<EmbodimentMapping> make_embodiment(const EmbodimentConfig& hand);
+
 /// Reads the hand's URDF and the operator's hand model and builds the models. Errors: kNotFound, kMalformed,
 /// kInvalidArgument; the sentence names the file or key.
 [[nodiscard]] Result<Models> make_models(const config::EmbodyConfig& config);

@@ -30,7 +30,7 @@ Result<hand::HandData> make_hand(const config::SubjectConfig& subject) {
   Result<hand::HandData> data = mano::load_hand(subject.model);
   if (data && data->side != subject.side) {
     return make_error(Errc::kInvalidArgument, "[subject] side is \"%s\", but the model %.120s is of the other hand",
-                      config::kSideNames[static_cast<std::size_t>(subject.side)], subject.model.c_str());
+                      kSideNames[static_cast<std::size_t>(subject.side)], subject.model.c_str());
   }
   return data;
 }

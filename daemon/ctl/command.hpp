@@ -22,7 +22,13 @@ void add_demo_command(CLI::App& app, int& exit_code);
 void add_import_mano_command(CLI::App& app, int& exit_code);
 /// calibrate: a subject file from free finger motion.
 void add_calibrate_command(CLI::App& app, int& exit_code);
-/// evaluate: judges the record mapping on recordings.
+/// evaluate: judges the record mapping and robot hands on recordings.
 void add_evaluate_command(CLI::App& app, int& exit_code);
+/// Adds `embodiment` and `similarity` to `evaluate`.
+void add_evaluate_hands_commands(CLI::App& evaluate, int& exit_code);
+/// convert: recordings to trajectories of a robot hand.
+void add_convert_command(CLI::App& app, int& exit_code);
+/// onboard: a hand file for any URDF.
+void add_onboard_command(CLI::App& app, int& exit_code);
 
 }  // namespace embody::ctl

@@ -134,7 +134,7 @@ int run(const Options& options) {
 
 void add_evaluate_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<Options>();  // lives in the callback
-  CLI::App* evaluate = app.add_subcommand("evaluate", "Judge the record mapping on recordings");
+  CLI::App* evaluate = app.add_subcommand("evaluate", "Judge record mapping and robot hands on recordings");
   evaluate->require_subcommand(1);
   CLI::App* record = evaluate->add_subcommand(
       "record", "From markers to the human hand: residuals, frozen fingers, joint steps, cost, time");
@@ -152,6 +152,7 @@ void add_evaluate_command(CLI::App& app, int& exit_code) {
                    "Bounds and weights of the published record mapping, without coupling and temporal term");
   record->add_option("--json", options->json_file, "Also write the figures to this file");
   record->callback([options, &exit_code] { exit_code = run(*options); });
+  add_evaluate_hands_commands(*evaluate, exit_code);
 }
 
 }  // namespace embody::ctl

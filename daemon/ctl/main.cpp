@@ -16,6 +16,8 @@ constexpr std::array kCommands{
     embody::ctl::Command{&embody::ctl::add_import_mano_command},
     embody::ctl::Command{&embody::ctl::add_calibrate_command},
     embody::ctl::Command{&embody::ctl::add_evaluate_command},
+    embody::ctl::Command{&embody::ctl::add_convert_command},
+    embody::ctl::Command{&embody::ctl::add_onboard_command},
 };
 
 constexpr const char* kFooter =

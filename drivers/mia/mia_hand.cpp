@@ -93,7 +93,7 @@ void MiaHand::queue_move(const HandCommand& command, TimePoint now) noexcept {
   for (std::size_t i = 0; i < kMotors; ++i) {
     q_rad[i] = std::clamp(command.q_rad[i], config_.min_rad[i], config_.max_rad[i]);
   }
-  const auto counts = motor_counts(config_.transmission, q_rad, config_.lateral_thumb);
+  const auto counts = motor_counts(config_.transmission, q_rad);
   for (std::size_t i = 0; i < kMotors; ++i) {
     const double lowest = i == at(Motor::kIndex) ? -kMaxCounts : 0;
     const int target = static_cast<int>(std::lround(std::clamp<double>(counts[i], lowest, kMaxCounts)));

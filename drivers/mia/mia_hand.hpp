@@ -13,9 +13,8 @@ struct MiaConfig {
   std::string device{"/dev/ttyUSB0"};
   Duration ack_timeout{std::chrono::milliseconds(20)};  ///< for the ACK, and again for the data after it
   int speed_percent{60};                                ///< 0..99; 100 % of the range is 90 units of the vendor
-  bool lateral_thumb{false};                            ///< branch of the index crank, see motor_counts()
   int lost_after_timeouts{5};                           ///< consecutive ones that end the session
-  std::array<double, kMotors> min_rad{0.0, 0.0, 0.0};   ///< joint limits; targets are clamped to them
+  std::array<double, kMotors> min_rad{0.0, -1.4, 0.0};  ///< motor limits; targets are clamped to them
   std::array<double, kMotors> max_rad{1.1345, 1.4, 1.396};
   Transmission transmission;
 };

@@ -65,17 +65,15 @@ std::array<double, kMotors> joint_angles_rad(const Transmission& transmission,
                                              const std::array<double, kMotors>& counts) noexcept {
   const auto& [thumb, index, mrl] = transmission;
   return {thumb.rad_per_count * (counts[at(Motor::kThumb)] - thumb.zero_counts),
-          std::abs(index_delta_rad(index, counts[at(Motor::kIndex)])),
+          index_delta_rad(index, counts[at(Motor::kIndex)]),
           mrl.rad_per_count * (counts[at(Motor::kMrl)] - mrl.zero_counts)};
 }
 
-std::array<double, kMotors> motor_counts(const Transmission& transmission, const std::array<double, kMotors>& q_rad,
-                                         bool lateral_thumb) noexcept {
+std::array<double, kMotors> motor_counts(const Transmission& transmission,
+                                         const std::array<double, kMotors>& q_rad) noexcept {
   const auto& [thumb, index, mrl] = transmission;
-  const double flexion_rad = q_rad[at(Motor::kIndex)];
   return {q_rad[at(Motor::kThumb)] / thumb.rad_per_count + thumb.zero_counts,
-          index_counts(index, lateral_thumb ? -flexion_rad : flexion_rad),
-          q_rad[at(Motor::kMrl)] / mrl.rad_per_count + mrl.zero_counts};
+          index_counts(index, q_rad[at(Motor::kIndex)]), q_rad[at(Motor::kMrl)] / mrl.rad_per_count + mrl.zero_counts};
 }
 
 double thumb_opposition_rad(double delta_rad) noexcept {

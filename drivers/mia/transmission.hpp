@@ -47,14 +47,13 @@ struct Transmission {
 /// Inverse of index_delta_rad().
 [[nodiscard]] double index_counts(const IndexTransmission& index, double delta_rad) noexcept;
 
-/// Joint angles (rad, order of kJointNames) at the given motor counts; the index flexion is |delta|.
+/// Motor coordinates (rad, order of kJointNames) at the given motor counts: thumb flexion, the index crank's signed
+/// delta, flexion of middle, ring and little finger.
 [[nodiscard]] std::array<double, kMotors> joint_angles_rad(const Transmission& transmission,
                                                            const std::array<double, kMotors>& counts) noexcept;
-/// Motor counts for joint angles. `lateral_thumb` selects the branch of the index crank: with it the index flexes while
-/// the thumb abducts to the side, without it the thumb opposes the fingers.
+/// Inverse of joint_angles_rad().
 [[nodiscard]] std::array<double, kMotors> motor_counts(const Transmission& transmission,
-                                                       const std::array<double, kMotors>& q_rad,
-                                                       bool lateral_thumb) noexcept;
+                                                       const std::array<double, kMotors>& q_rad) noexcept;
 
 /// Angle of the passive joint j_thumb_opp (rad, in [-0.6283, 0]) that belongs to the index crank angle.
 [[nodiscard]] double thumb_opposition_rad(double delta_rad) noexcept;

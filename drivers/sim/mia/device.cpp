@@ -112,7 +112,7 @@ void MiaDevice::execute(const mia::Request& request) {
     case Kind::kJointPosition: {
       ++counters_.motions;
       const double angle_rad = 0.01 * request.value;
-      const auto counts = mia::motor_counts(config_.transmission, {angle_rad, angle_rad, angle_rad}, false);
+      const auto counts = mia::motor_counts(config_.transmission, {angle_rad, angle_rad, angle_rad});
       motors_[m].move_to(counts[m], request.speed_percent);
       break;
     }

@@ -89,6 +89,19 @@ TEST(BadConfiguration, AValueInAWrongUnitIsOutOfRange) {
   EXPECT_NE(result.errors.find("m/s"), std::string::npos) << result.errors;
 }
 
+TEST(BadConfiguration, AHandThatTheDriverDoesNotMoveOrOfTheOtherSideIsRefused) {
+  const TemporaryFolder folder;
+  folder.write("shadow.toml", "schema = 1\n[hand]\nfile = \"hands/shadow.toml\"\n");
+  const Finished shadow = run_program("embodyd", {"--config", folder.file("shadow.toml")});
+  EXPECT_EQ(shadow.exit_code, kExitConfiguration);
+  EXPECT_NE(shadow.errors.find("j_mrl_fle; the hand file of \"shadow\" has others"), std::string::npos)
+      << shadow.errors;
+  folder.write("left.toml", "schema = 1\n[subject]\nfile = \"subjects/default_left.toml\"\n");
+  const Finished left = run_program("embodyd", {"--config", folder.file("left.toml")});
+  EXPECT_EQ(left.exit_code, kExitConfiguration);
+  EXPECT_NE(left.errors.find("[hand] side is right"), std::string::npos) << left.errors;
+}
+
 TEST(BadConfiguration, AFileThatIsNotThereIsSaidSo) {
   const Finished result = run_program("embodyd", {"--config", "/nowhere/embody.toml"});
   EXPECT_EQ(result.exit_code, kExitConfiguration);

@@ -1,6 +1,6 @@
 // finger_work FRAMES guarded|trusted: steps the finger estimator and prints how many evaluations its solvers used in
-// all: one per iteration and one per solve. trusted: random markers, the worst that can come, every one fitted. guarded: the synthetic motion with a label
-// that jumps about, as shipped. Run under callgrind by finger_work_test.
+// all: one per iteration and one per solve. trusted: random markers, the worst that can come, every one fitted.
+// guarded: the synthetic motion with a label that jumps about, as shipped. Run under callgrind by finger_work_test.
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>

@@ -289,7 +289,7 @@ TEST(ConfigDocumentation, TheDefaultsInThePageAreTheDefaultsInForce) {
     ++keys;
     const std::string key = line.substr(0, equals), value = line.substr(equals + 3);
     if (key == "file") continue;     // printed values need no file
-    if (key == "markers") continue;  // an empty list of tables
+    if (key == "markers" || key == "couplings" || key == "pads") continue;  // empty lists of tables
     EXPECT_NE(page.find("| `" + key + "` | `" + value + "` |"), std::string::npos) << line;
   }
   EXPECT_GT(keys, 80u);

@@ -32,9 +32,14 @@ EmbodimentConfig mia_config() {
   config.motor_lower_rad = numbers(file["motor_lower_rad"]);
   config.motor_upper_rad = numbers(file["motor_upper_rad"]);
   config.thumb_mode = file["thumb_mode"].value<std::string>() == "opposed" ? ThumbMode::kOpposed : ThumbMode::kLateral;
-  config.thumb_joint = file["thumb_joint"].value<std::string>().value();
-  config.thumb_opposed_rad = file["thumb_opposed_rad"].value<double>().value();
-  config.thumb_lateral_rad = file["thumb_lateral_rad"].value<double>().value();
+  config.thumb_motor = file["thumb_motor"].value<std::string>().value();
+  config.thumb_opposed_from_rad = file["thumb_opposed_from_rad"].value<double>().value();
+  for (toml::node& item : *file["couplings"].as_array()) {
+    const toml::node_view<toml::node> coupling(item);
+    config.couplings.push_back({coupling["joint"].value<std::string>().value(),
+                                coupling["motor"].value<std::string>().value(), numbers(coupling["motor_rad"]),
+                                numbers(coupling["joint_rad"])});
+  }
   config.finger_zero_offset_rad = file["finger_zero_offset_rad"].value<double>().value();
   config.zero_offset_joints = names(file["zero_offset_joints"]);
   for (std::size_t i = 0; i < kFingers; ++i) {

@@ -107,18 +107,19 @@ EmbodimentConfig gripper_config(double range) {
   config.motor_lower_rad = {-range};
   config.motor_upper_rad = {range};
   config.X_PM << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03;
-  config.fingers[0] = {"left", {0.0, 0.1, 0.0}, {0.01, 0.05, 0.0}};
-  config.fingers[1] = {"right", {0.0, 0.1, 0.0}, {-0.01, 0.05, 0.01}};
+  config.fingers[0] = {"left", {0.0, 0.1, 0.0}, {0.01, 0.05, 0.0}, {}, {}};
+  config.fingers[1] = {"right", {0.0, 0.1, 0.0}, {-0.01, 0.05, 0.01}, {}, {}};
   return config;
 }
 
 void expect_never_worse_than_a_grid(const EmbodimentConfig& config, const robot::RobotModel& model, double noise_m,
                                     unsigned seed) {
-  EmbodimentMapping mapping = make(config, model);
-  RandomHand random_hand(mapping, seed);
+  const EmbodimentMapping fresh = make(config, model);
+  RandomHand random_hand(fresh, seed);
   FingerTarget target;
   for (int i = 0; i < 50; ++i) {
     const Points p_P = random_hand.points(noise_m);
+    EmbodimentMapping mapping = fresh;
     mapping.step(state_of(mapping, p_P), target);
     ASSERT_TRUE(target.valid);
     std::vector<double> r(target.q_rad.begin(), target.q_rad.begin() + static_cast<long>(target.joint_count));
@@ -196,18 +197,25 @@ TEST(EmbodimentMapping, SolvesMiddleRingAndLittleTogetherAndNeverWorseThanTheMea
   EXPECT_GT(clearly_better, 100);
 }
 
-TEST(EmbodimentMapping, DoesNotDependOnEarlierHands) {
-  EmbodimentMapping with_history = make(test::mia_config());
+// Two minima of about the same cost must not alternate: what the hand did before counts for up to a tenth of the cost.
+TEST(EmbodimentMapping, DependsOnEarlierHandsByATenthOfTheCostAtMost) {
+  const EmbodimentConfig config = test::mia_config();
+  EmbodimentMapping with_history = make(config);
   const EmbodimentMapping without_history = with_history;
   RandomHand random_hand(with_history, /*seed=*/9);
   FingerTarget target, fresh_target;
+  int equal = 0;
   for (int i = 0; i < 100; ++i) {
-    const HandState state = state_of(with_history, random_hand.points(0.05));
+    const Points p_P = random_hand.points(0.05);
+    const HandState state = state_of(with_history, p_P);
     with_history.step(state, target);
     EmbodimentMapping fresh = without_history;
     fresh.step(state, fresh_target);
-    ASSERT_EQ(target.q_rad, fresh_target.q_rad);
+    ASSERT_LE(0.9 * cost(with_history, config, p_P, target.q_rad),
+              cost(with_history, config, p_P, fresh_target.q_rad) + 1e-12);
+    equal += std::abs(target.q_rad[1] - fresh_target.q_rad[1]) < 1e-6 ? 1 : 0;
   }
+  EXPECT_GT(equal, 80);
 }
 
 TEST(EmbodimentMapping, ReportsTheRootMeanSquareDistanceOfEachFinger) {
@@ -326,13 +334,13 @@ TEST(EmbodimentMapping, GivesAllUrdfAnglesWithMimicJointsAndTheThumbsOpposition)
   EmbodimentConfig config = test::mia_config();
   config.thumb_mode = ThumbMode::kLateral;
   const EmbodimentMapping mapping = make(config);
-  const HandJointAngles angles = mapping.urdf_joint_angles(std::array<double, 3>{0.1, 0.2, 0.3});
+  const HandJointAngles angles = mapping.urdf_joint_angles(std::array<double, 3>{0.1, -0.9, 0.3});
   ASSERT_EQ(angles.count, 6U);
   ASSERT_EQ(mapping.urdf_joint_names().size(), 6U);
   for (std::size_t i = 0; i < angles.count; ++i) {
     const std::string& name = mapping.urdf_joint_names()[i];
     const double expected = name == "j_thumb_fle"   ? 0.1
-                            : name == "j_index_fle" ? 0.2
+                            : name == "j_index_fle" ? 0.9
                             : name == "j_thumb_opp" ? -0.628319
                                                     : 0.3;
     EXPECT_EQ(angles.q_rad[i], expected) << name;
@@ -342,10 +350,13 @@ TEST(EmbodimentMapping, GivesAllUrdfAnglesWithMimicJointsAndTheThumbsOpposition)
 
 TEST(EmbodimentMapping, KeepsTheIndexFromItsNegativeHalfAndIntersectsTheUrdfsLimits) {
   EmbodimentConfig config = test::mia_config();
-  EXPECT_EQ(make(config).lower_rad(1), 0.0);
+  EXPECT_EQ(make(config).lower_rad(1), 0.0731);
   config.motor_lower_rad[1] = -9.0;
   config.motor_upper_rad[2] = 9.0;
+  EXPECT_EQ(make(config).lower_rad(1), 0.0731);
+  config.thumb_mode = ThumbMode::kLateral;
   EXPECT_EQ(make(config).lower_rad(1), -1.4);
+  EXPECT_EQ(make(config).upper_rad(1), 0.0);
   EXPECT_EQ(make(config).upper_rad(2), 1.39626);
 }
 
@@ -364,21 +375,15 @@ TEST(EmbodimentMapping, ExplainsConfigurationsThatDoNotFit) {
   expect_error("motor_lower_rad", [](auto& c) { c.motor_lower_rad.pop_back(); });
   expect_error("motor_upper_rad", [](auto& c) { c.motor_upper_rad[0] = INFINITY; });
   expect_error("'j_index_fle' has an empty range", [](auto& c) { c.motor_lower_rad[1] = 1.5; });
-  expect_error("thumb_lateral_rad", [](auto& c) {
-    c.thumb_mode = ThumbMode::kLateral;
-    c.thumb_lateral_rad = 0.5;
-  });
+  expect_error("couplings", [](auto& c) { c.couplings[0].joint_rad.pop_back(); });
+  expect_error("'j_thumb_opp' leaves", [](auto& c) { c.couplings[1].joint_rad[1] = 0.5; });
+  expect_error("must increase", [](auto& c) { std::swap(c.couplings[1].motor_rad[0], c.couplings[1].motor_rad[1]); });
+  expect_error("'crank'", [](auto& c) { c.couplings[1].motor = "crank"; });
+  expect_error("thumb_motor", [](auto& c) { c.thumb_motor = "crank"; });
   expect_error("'j_toe'", [](auto& c) { c.motors[0] = "j_toe"; });
   expect_error("'toe'", [](auto& c) { c.fingers[3].link = "toe"; });
   expect_error("'j_toe'", [](auto& c) { c.zero_offset_joints[0] = "j_toe"; });
   expect_error("finger_zero_offset_rad", [](auto& c) { c.finger_zero_offset_rad = NAN; });
-  expect_error("[index] link 'palm' must turn", [](auto& c) { c.fingers[1].link = "palm"; });
-  expect_error("[thumb] link 'thumb_fle' must turn", [](auto& c) {  // two motors move the thumb
-    c.motors.push_back("j_thumb_opp");
-    c.motor_lower_rad.push_back(-0.6);
-    c.motor_upper_rad.push_back(0.0);
-    c.thumb_joint.clear();
-  });
 }
 
 TEST(EmbodimentMapping, NeverAllocatesInAStep) {

@@ -112,7 +112,7 @@ TEST(MiaDevice, UnderstandsJointAnglesAndReportsThemSigned) {
   command(mia::encode_joint_position(Motor::kIndex, -0.65, 60));
   const mia::Command read = mia::encode_plain("ADJo");
   EXPECT_EQ(command(read), ack(read) + "JP+050+100-065\n");
-  EXPECT_NEAR(hand.joint_angles_rad()[1], 0.65, 1e-6) << "flexion is the magnitude";
+  EXPECT_NEAR(hand.joint_angles_rad()[1], -0.65, 1e-6) << "the crank's coordinate";
   const mia::Command speeds = mia::encode_plain("ADjo");
   EXPECT_EQ(command(speeds), ack(speeds) + "JS+00+00+00\n");
 }

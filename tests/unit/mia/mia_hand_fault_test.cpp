@@ -76,7 +76,7 @@ TEST(MiaHand, LostAckIsCountedAndTheTargetSentAgain) {
 
 TEST(MiaHand, TargetWhoseAckWasLostIsTakenBackByTheNextOne) {
   MiaRig rig(quick_config());
-  const double open = std::round(mia::motor_counts({}, {0.1, 0.0, 0.0}, false)[0]);
+  const double open = std::round(mia::motor_counts({}, {0.1, 0.0, 0.0})[0]);
   ASSERT_TRUE(rig.arrives(MiaRig::move(0.1, 0.0, 0.0), 0, open));
   rig.simulator.drop_next(1);
   ASSERT_TRUE(rig.cycle(MiaRig::move(1.0, 0.0, 0.0)));  // obeyed, but not acknowledged

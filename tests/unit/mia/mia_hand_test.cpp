@@ -29,7 +29,7 @@ TEST(MiaHand, NothingMovesOnConnect) {
   EXPECT_EQ(rig.simulator.motor_counts(), simulated.start_counts);
   const auto q_rad = mia::joint_angles_rad({}, simulated.start_counts);
   for (std::size_t i = 0; i < mia::kMotors; ++i) EXPECT_NEAR(rig.state.q_rad[i], q_rad[i], 1e-12);
-  EXPECT_GT(rig.state.q_rad[1], 0.4) << "index flexion is a magnitude";
+  EXPECT_LT(rig.state.q_rad[1], -0.4) << "the lateral branch";
 }
 
 TEST(MiaHand, FollowsASineWithinTheLagOfThePlant) {
@@ -109,7 +109,7 @@ TEST(MiaHand, NewestTargetReplacesWhatIsStillQueuedAndPositionsAreReadAllTheSame
   EXPECT_LE(rig.simulator.counters().commands - before, 51u) << "one command per 10 ms, however often one writes";
   EXPECT_GE(rig.replies, 5u) << "a quarter of the bus belongs to the positions";
   EXPECT_EQ(rig.simulator.counters().dropped_as_early, 0u) << "half duplex is kept";
-  const auto counts = mia::motor_counts({}, {0.5, 0.6, 0.7}, false);
+  const auto counts = mia::motor_counts({}, {0.5, 0.6, 0.7});
   EXPECT_TRUE(rig.arrives(MiaRig::move(0.5, 0.6, 0.7), 2, std::round(counts[2])));
 }
 
@@ -149,15 +149,13 @@ TEST(MiaHand, TargetsBeyondTheLimitsEndAtTheLimits) {
   EXPECT_TRUE(rig.arrives(MiaRig::move(-9.0, -9.0, -9.0), 0, 0.0));
 }
 
-TEST(MiaHand, LateralThumbFlexesTheIndexOnTheOtherBranch) {
-  mia::MiaConfig config = patient_config();
-  config.lateral_thumb = true;
-  MiaRig rig(config);
+TEST(MiaHand, FlexesTheIndexOnTheOtherBranchForALateralThumb) {
+  MiaRig rig(patient_config());
   const double counts = std::round(mia::index_counts({}, -1.0));
   ASSERT_LT(counts, -150.0);
-  ASSERT_TRUE(rig.arrives(MiaRig::move(0.0, 1.0, 0.0), 1, counts));
+  ASSERT_TRUE(rig.arrives(MiaRig::move(0.0, -1.0, 0.0), 1, counts));
   ASSERT_TRUE(rig.cycle(MiaRig::plain(HandAction::kHold)));
-  EXPECT_NEAR(rig.state.q_rad[1], 1.0, 0.01);
+  EXPECT_NEAR(rig.state.q_rad[1], -1.0, 0.01);
   EXPECT_NEAR(rig.hand->thumb_opposition(), -0.6283, 1e-6);
 }
 
@@ -246,7 +244,7 @@ TEST(MiaHand, ConnectRefusesAnUnusableConfiguration) {
   };
   EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.speed_percent = 0; }));
   EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.speed_percent = 100; }));
-  EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.max_rad[1] = -1.0; }));
+  EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.max_rad[1] = -2.0; }));
   EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.min_rad[0] = std::nan(""); }));
   EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.ack_timeout = Duration::zero(); }));
   EXPECT_TRUE(refused([](mia::MiaConfig& c) { c.lost_after_timeouts = 0; }));

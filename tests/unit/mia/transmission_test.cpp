@@ -61,14 +61,11 @@ TEST(MiaTransmission, AnglesComeBackFromCountsOnBothBranchesOfTheThumb) {
   hand.thumb = {0.0046, 3.0};
   hand.mrl = {0.0053, -2.0};
   hand.index.zero_counts = 4.5;
-  for (const bool lateral : {false, true}) {
-    for (double q = 0.0; q <= 1.37; q += 0.01) {
-      const auto counts = motor_counts(hand, {q, q, q}, lateral);
-      const auto back = joint_angles_rad(hand, counts);
-      for (const double angle : back) ASSERT_NEAR(angle, q, 1e-12) << (lateral ? "lateral" : "opposed");
-      const double delta_rad = index_delta_rad(hand.index, counts[1]);
-      ASSERT_NEAR(delta_rad, lateral ? -q : q, 1e-12);
-    }
+  for (double q = -1.37; q <= 1.37; q += 0.01) {
+    const auto counts = motor_counts(hand, {q, q, q});
+    const auto back = joint_angles_rad(hand, counts);
+    for (const double angle : back) ASSERT_NEAR(angle, q, 1e-12);
+    ASSERT_NEAR(index_delta_rad(hand.index, counts[1]), q, 1e-12);
   }
 }
 
@@ -76,7 +73,7 @@ TEST(MiaTransmission, WholeCountsCostAtMostHalfACountOfAngle) {
   const Transmission hand;
   const std::array<double, 3> half_count_rad{0.0023, 0.0043, 0.0028};
   for (double q = 0.0; q <= 1.13; q += 0.007) {
-    auto counts = motor_counts(hand, {q, q, q}, false);
+    auto counts = motor_counts(hand, {q, q, q});
     for (double& c : counts) c = std::round(c);
     const auto back = joint_angles_rad(hand, counts);
     for (std::size_t i = 0; i < kMotors; ++i) ASSERT_NEAR(back[i], q, half_count_rad[i]) << kJointNames[i];
