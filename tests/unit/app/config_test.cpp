@@ -288,7 +288,7 @@ TEST(ConfigDocumentation, TheDefaultsInThePageAreTheDefaultsInForce) {
     if (equals == std::string::npos) continue;
     ++keys;
     const std::string key = line.substr(0, equals), value = line.substr(equals + 3);
-    if (key == "file") continue;     // printed values need no file
+    if (key == "file") continue;                                            // printed values need no file
     if (key == "markers" || key == "couplings" || key == "pads") continue;  // empty lists of tables
     EXPECT_NE(page.find("| `" + key + "` | `" + value + "` |"), std::string::npos) << line;
   }
