@@ -13,6 +13,7 @@
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/collect_frames.hpp"
 #include "daemon/ctl/command.hpp"
+#include "daemon/ctl/offline.hpp"
 #include "daemon/ctl/status_table.hpp"
 #include "daemon/evaluate/calibration_report.hpp"
 #include "daemon/evaluate/recorded_frames.hpp"
@@ -81,20 +82,6 @@ Source record_live(const Options& options, const config::EmbodyConfig& config, c
           "the tracker at " + printable(config.tracker.host) + ", " + std::to_string(options.duration_s) + " s"};
 }
 
-/// Before ten seconds of motion are asked for. The figures come from the same run as the subject file: --force is of
-/// both.
-int check_outputs(const Options& options) {
-  if (const Status writable = transport::check_output(options.output, options.force); !writable) {
-    return fail_file(writable.error());
-  }
-  if (!options.json_file) return kExitOk;
-  if (*options.json_file == options.output) {
-    return fail(make_error(Errc::kInvalidArgument, "--json and --output name the same file"), kExitUsage);
-  }
-  const Status writable = transport::check_output(*options.json_file, options.force);
-  return writable ? kExitOk : fail_file(writable.error());
-}
-
 std::string date_now() {
   const std::time_t t = std::time(nullptr);
   std::tm local{};
@@ -115,7 +102,7 @@ int run(const Options& options) {
   }
   const auto nominal = make_operator_models(evaluate::nominal_config(*config));
   if (!nominal) return fail(nominal.error(), kExitConfiguration);
-  if (const int code = check_outputs(options); code != kExitOk) return code;
+  if (const int code = check_outputs(options.output, options.json_file, options.force); code != kExitOk) return code;
 
   const Source source = options.recording.empty() ? record_live(options, *config, nominal->layout)
                                                   : read_recording(options, nominal->layout);

@@ -19,6 +19,7 @@
 #include "daemon/convert/trajectory_columns.hpp"
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/command.hpp"
+#include "daemon/ctl/offline.hpp"
 #include "daemon/ctl/status_table.hpp"
 
 namespace embody::ctl {
@@ -45,21 +46,14 @@ struct Options {
 
 /// The configuration with what the command line changes.
 Result<config::EmbodyConfig> configuration(const Options& options) {
-  const auto path = config::find_config(options.config);
-  if (!path) return path.error();
-  Result<config::EmbodyConfig> config = config::load_config(*path);
+  Result<config::EmbodyConfig> config = offline_config(options.config, options.subject);
   if (!config) return config;
-  if (!options.subject.empty()) {
-    Result<config::SubjectConfig> subject = config::load_subject(options.subject);
-    if (!subject) return subject.error();
-    config->subject = std::move(*subject);
-  }
   if (!options.hand.empty()) {
     Result<config::HandConfig> hand = config::load_hand(options.hand);
     if (!hand) return hand.error();
     config->hand.embodiment = std::move(hand->embodiment);
+    config->hand.embodiment.side = config->subject.side;
   }
-  config->tracker.driver = config::TrackerDriver::kQualisys;  // recordings are of marker gloves
   return config;
 }
 

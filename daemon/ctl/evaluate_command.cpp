@@ -13,6 +13,7 @@
 #include "daemon/control/exit_code.hpp"
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/command.hpp"
+#include "daemon/ctl/offline.hpp"
 #include "daemon/ctl/status_table.hpp"
 #include "daemon/evaluate/record_summary.hpp"
 #include "daemon/evaluate/recorded_frames.hpp"
@@ -36,23 +37,13 @@ struct Options {
 
 /// The configuration with what the command line changes.
 Result<config::EmbodyConfig> configuration(const Options& options) {
-  const auto path = config::find_config(options.config);
-  if (!path) return path.error();
-  Result<config::EmbodyConfig> config = config::load_config(*path);
+  Result<config::EmbodyConfig> config = offline_config(options.config, options.subject);
   if (!config) return config;
-  if (!options.subject.empty()) {
-    Result<config::SubjectConfig> subject = config::load_subject(options.subject);
-    if (!subject) return subject.error();
-    config->subject = std::move(*subject);
-  }
   config::RecordMappingConfig& mapping = config->record_mapping;
   if (options.solver == "own") mapping.solver = hand::FingerSolver::kOwn;
   if (options.solver == "slsqp") mapping.solver = hand::FingerSolver::kSlsqp;
   if (options.objective == "paper") mapping.objective = hand::FingerObjective::kPaper;
   if (options.objective == "published") mapping.objective = hand::FingerObjective::kPublished;
-  if (config->tracker.driver == config::TrackerDriver::kLandmarks) {
-    config->tracker.driver = config::TrackerDriver::kQualisys;  // recordings are of marker gloves
-  }
   return config;
 }
 

@@ -14,6 +14,7 @@
 #include "daemon/control/exit_code.hpp"
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/command.hpp"
+#include "daemon/ctl/offline.hpp"
 #include "daemon/evaluate/embodiment_evaluation.hpp"
 #include "daemon/evaluate/recorded_frames.hpp"
 #include "daemon/evaluate/similarity_report.hpp"
@@ -54,16 +55,8 @@ Inputs read_inputs(const Options& options) {
       return failed(fail_file(writable.error()));
     }
   }
-  const auto path = config::find_config(options.config);
-  if (!path) return failed(fail(path.error(), kExitConfiguration));
-  Result<config::EmbodyConfig> config = config::load_config(*path);
+  const Result<config::EmbodyConfig> config = offline_config(options.config, options.subject);
   if (!config) return failed(fail(config.error(), kExitConfiguration));
-  if (!options.subject.empty()) {
-    Result<config::SubjectConfig> subject = config::load_subject(options.subject);
-    if (!subject) return failed(fail(subject.error(), kExitConfiguration));
-    config->subject = std::move(*subject);
-  }
-  config->tracker.driver = config::TrackerDriver::kQualisys;  // recordings are of marker gloves
   Inputs inputs;
   Result<OperatorModels> models = make_operator_models(*config);
   if (!models) return failed(fail(models.error(), kExitConfiguration));

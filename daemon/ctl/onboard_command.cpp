@@ -10,6 +10,7 @@
 #include "daemon/control/exit_code.hpp"
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/command.hpp"
+#include "daemon/ctl/offline.hpp"
 #include "daemon/ctl/status_table.hpp"
 #include "daemon/evaluate/onboard_toml.hpp"
 #include "drivers/transport/file.hpp"
@@ -35,18 +36,6 @@ std::string beside(const std::string& urdf, const std::string& output) {
   return relative.empty() ? file.string() : relative.string();
 }
 
-int check_outputs(const Options& options) {
-  if (const Status writable = transport::check_output(options.output, options.force); !writable) {
-    return fail_file(writable.error());
-  }
-  if (!options.json_file) return kExitOk;
-  if (*options.json_file == options.output) {
-    return fail(make_error(Errc::kInvalidArgument, "--json and --output name the same file"), kExitUsage);
-  }
-  const Status writable = transport::check_output(*options.json_file, options.force);
-  return writable ? kExitOk : fail_file(writable.error());
-}
-
 int run(Options options) {
   const auto text = transport::load_text(options.urdf, robot::kMaxUrdfBytes, "a robot model (.urdf)");
   if (!text) return fail_file(text.error());
@@ -55,7 +44,7 @@ int run(Options options) {
   if (options.output.empty()) {
     options.output = std::filesystem::path(options.urdf).stem().string() + ".toml";
   }
-  if (const int code = check_outputs(options); code != kExitOk) return code;
+  if (const int code = check_outputs(options.output, options.json_file, options.force); code != kExitOk) return code;
 
   OnboardingOptions onboard;
   onboard.name = options.name;

@@ -187,7 +187,9 @@ TEST(HandSolver, CostsNoMoreThanSlsqpWithTheAdditions) {
       Comparison sum;
       for (int run = 0; run < 5; ++run) sum += compare(make(test::hand_model(name), config), 200, random);
       print(what, name, sum);
-      EXPECT_LE(sum.costly, 0.02 * sum.frames) << name << ", " << what;  // more minima than without
+      // Shadow has more minima with the additions than without them; all others hold the bound of the plain objective.
+      const bool many = std::string(name) == "shadow" && what != std::string("pinch");
+      EXPECT_LE(sum.costly, (many ? 0.015 : 0.005) * sum.frames) << name << ", " << what;
     }
   }
 }

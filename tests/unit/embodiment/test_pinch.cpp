@@ -337,7 +337,7 @@ TEST(CollisionMargin, KeepsTheTipsApartInAWholeHandThatClosesAtRandom) {
     }
     std::cout << name << ": least gap " << 1e3 * with.low << " mm, of the goals " << 1e3 * without.low << " mm; "
               << near << " frames too near of " << brought << " whose goals were, of " << frames << "\n";
-    EXPECT_LE(near, 0.01 * brought) << name;  // three fingers may squeeze each other
+    EXPECT_LE(near, 0.005 * brought) << name;  // three fingers may squeeze each other
   }
 }
 
