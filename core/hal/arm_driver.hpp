@@ -1,7 +1,7 @@
 #pragma once
 // What the daemon needs of a robot arm, and nothing more.
 #include "core/base/result.hpp"
-#include "core/hal/hand_tracker.hpp"
+#include "core/hal/device.hpp"
 #include "core/hal/types.hpp"
 
 namespace embody {
@@ -14,21 +14,19 @@ struct ArmInfo {
 
 /// A six-joint arm that streams states and takes one joint target per state. One session at a time. connect() and
 /// service() may block (at most about 5 s) and allocate; read() and write() neither block nor allocate. Calls never
-/// overlap. Connecting never moves anything; the destructor ends the session so that the arm stands still.
-class ArmDriver {
+/// overlap, except service() with read() and write(). Connecting never moves anything; the destructor ends the session so that the arm stands still.
+class ArmDriver : public Device {
  public:
-  ArmDriver() = default;
-  ArmDriver(const ArmDriver&) = delete;
-  ArmDriver& operator=(const ArmDriver&) = delete;
   virtual ~ArmDriver() = default;
 
   virtual Result<ArmInfo> connect() = 0;
+  /// Slow upkeep about once a second while connected: sees to it that the robot has our control program, which stands
+  /// still until commands come. An error is a sentence for the operator and does not end the session.
+  virtual Status service() = 0;
   /// Next buffered package in order of arrival; call until kEmpty.
   virtual IoStatus read(ArmState& state) noexcept = 0;
   /// Sends `command` unless it has expired at `now`.
   virtual IoStatus write(const ArmCommand& command, TimePoint now) noexcept = 0;
-  /// Why the last session ended, for people; empty while it lasts. Call it from the owner of the driver.
-  [[nodiscard]] virtual std::string_view reason() const noexcept = 0;
 };
 
 }  // namespace embody

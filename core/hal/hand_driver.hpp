@@ -1,7 +1,7 @@
 #pragma once
 // What the daemon needs of a robot hand, and nothing more.
 #include "core/base/result.hpp"
-#include "core/hal/hand_tracker.hpp"
+#include "core/hal/device.hpp"
 #include "core/hal/types.hpp"
 
 namespace embody {
@@ -17,11 +17,8 @@ struct HandInfo {
 /// A robot hand with position-controlled motors. One session at a time. connect() may block (at most about 5 s) and
 /// allocate; read() and write() neither block nor allocate. Calls never overlap. Connecting never moves anything; the
 /// destructor stops the motors.
-class HandDriver {
+class HandDriver : public Device {
  public:
-  HandDriver() = default;
-  HandDriver(const HandDriver&) = delete;
-  HandDriver& operator=(const HandDriver&) = delete;
   virtual ~HandDriver() = default;
 
   virtual Result<HandInfo> connect() = 0;
@@ -29,8 +26,6 @@ class HandDriver {
   virtual IoStatus read(HandDeviceState& state) noexcept = 0;
   /// Starts the exchange of one cycle (targets, then a position request) unless the command has expired at `now`.
   virtual IoStatus write(const HandCommand& command, TimePoint now) noexcept = 0;
-  /// Why the last session ended, for people; empty while it lasts. Call it from the owner of the driver.
-  [[nodiscard]] virtual std::string_view reason() const noexcept = 0;
 };
 
 }  // namespace embody

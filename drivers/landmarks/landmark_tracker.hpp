@@ -45,7 +45,6 @@ class LandmarkTracker final : public HandTracker {
   /// `t_capture` is the sender's time mapped by the fastest arrivals of the session, or the arrival when it tells none.
   /// At most 16 datagrams that are not used are dropped per call; then kEmpty, though more may wait.
   IoStatus read(MarkerFrame& frame) noexcept override;
-  [[nodiscard]] std::string_view reason() const noexcept override { return reason_.view(); }
 
   [[nodiscard]] LandmarkCounters counters() const noexcept;
   /// Port of the present session, 0 without one.
@@ -59,7 +58,6 @@ class LandmarkTracker final : public HandTracker {
   transport::UniqueFd fd_;
   transport::Network network_;
   std::uint16_t port_{0};
-  FixedString<240> reason_;
   teleop::ClockMap clock_;
   bool started_{false};  // a frame was used in this connection
   std::uint64_t last_frame_{0};

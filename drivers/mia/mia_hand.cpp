@@ -33,9 +33,9 @@ double MiaHand::thumb_opposition() const noexcept {
   return thumb_opposition_rad(index_delta_rad(config_.transmission.index, reply_.counts[at(Motor::kIndex)]));
 }
 
-std::string_view MiaHand::reason() const noexcept {
-  if (!lost_) return "";
-  return hung_up_ ? "the serial device is gone; is it unplugged?" : "the hand no longer answers; has it power?";
+void MiaHand::hang_up() noexcept {
+  lost_ = hung_up_ = true;
+  reason_ = "the serial device is gone; is it unplugged?";
 }
 
 IoStatus MiaHand::read(HandDeviceState& state) noexcept {
@@ -111,7 +111,7 @@ void MiaHand::pump() noexcept {
     std::array<std::byte, 256> buffer;
     const auto [status, size] = transport::read_tty(fd_.get(), buffer);
     if (status == IoStatus::kDisconnected) {
-      lost_ = hung_up_ = true;
+      hang_up();
       return;
     }
     if (status == IoStatus::kEmpty) break;
@@ -171,7 +171,9 @@ void MiaHand::take_timeout() noexcept {
   if (bus_.sent == Sent::kStopAll || bus_.sent == Sent::kZeroSpeed) finish_stop_step(false);
   // A stop is tried to its end: the hand may hear us although we do not hear the hand.
   if (stop_.phase != StopPhase::kOver) return;
-  lost_ = std::max(bus_.timeouts_in_a_row, reply_.missed_in_a_row) >= config_.lost_after_timeouts;
+  if (std::max(bus_.timeouts_in_a_row, reply_.missed_in_a_row) < config_.lost_after_timeouts) return;
+  lost_ = true;
+  reason_ = "the hand no longer answers; has it power?";
 }
 
 void MiaHand::send_next(TimePoint now) noexcept {
@@ -215,7 +217,7 @@ void MiaHand::transmit(const Command& command, Sent what, TimePoint now) noexcep
   ++counters_.commands;
   // A full buffer needs no care of its own: the ACK will not come.
   if (transport::write_tty(fd_.get(), std::as_bytes(std::span(command))) == IoStatus::kDisconnected) {
-    lost_ = hung_up_ = true;
+    hang_up();
   }
 }
 

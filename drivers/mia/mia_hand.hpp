@@ -49,7 +49,6 @@ class MiaHand final : public HandDriver {
   Result<HandInfo> connect() override;
   IoStatus read(HandDeviceState& state) noexcept override;
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override;
-  [[nodiscard]] std::string_view reason() const noexcept override;
 
   [[nodiscard]] const MiaCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] bool stopped() const noexcept { return stop_.latched; }
@@ -109,6 +108,7 @@ class MiaHand final : public HandDriver {
   // Session
   Result<HandInfo> probe();
   void end_session() noexcept;
+  void hang_up() noexcept;
 
   // Bus
   void pump() noexcept;

@@ -108,6 +108,7 @@ Result<HandInfo> MiaHand::connect() {
   told_ = {};
   stop_ = {};
   lost_ = hung_up_ = false;
+  reason_ = {};
   return info;
 }
 

@@ -109,7 +109,7 @@ QualisysTracker::~QualisysTracker() = default;
 
 Result<TrackerInfo> QualisysTracker::connect() {
   session_.reset();
-  last_error_ = {};
+  reason_ = {};
   if (const auto status = check_names(marker_names_); !status) return status.error();
   const auto end = transport::now() + kConnectBudget;
   const auto soon = [&] { return std::min(end, transport::now() + config_.reply_timeout); };
@@ -218,7 +218,7 @@ IoStatus QualisysTracker::take_data(std::span<const std::byte> packet, MarkerFra
 
 IoStatus QualisysTracker::end_session(const Error& error) noexcept {
   session_->over = true;
-  last_error_ = error.detail;
+  reason_ = error.detail;
   return IoStatus::kDisconnected;
 }
 

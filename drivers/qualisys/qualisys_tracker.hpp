@@ -42,8 +42,6 @@ class QualisysTracker final : public HandTracker {
   /// and is not allowed, or when bytes break the protocol.
   IoStatus read(MarkerFrame& frame) noexcept override;
 
-  [[nodiscard]] std::string_view reason() const noexcept override { return last_error_.view(); }
-
  private:
   struct Session;
   IoStatus end_session(const Error& error) noexcept;
@@ -54,7 +52,6 @@ class QualisysTracker final : public HandTracker {
   std::vector<std::string> marker_names_;
   std::unique_ptr<Session> session_;
   std::uint32_t label_epoch_{0};
-  FixedString<240> last_error_;
 };
 
 }  // namespace embody::qualisys

@@ -71,6 +71,10 @@ Result<ArmInfo> UrRtdeArm::connect() {
   return info;
 }
 
+Status UrRtdeArm::service() {
+  return {};
+}
+
 Result<rtde::ControllerVersion> UrRtdeArm::negotiate(TimePoint deadline) {
   constexpr std::uint16_t kVersion = 2;
   auto reply = exchange(PackageType::kProtocolVersion, rtde::encode_protocol_request(kVersion), deadline);

@@ -40,6 +40,7 @@ class UrRtdeArm : public ArmDriver {
   /// kNotFound (a variable is missing), kRefused (registers owned by somebody else, or the stream was refused),
   /// kMalformed, kInvalidArgument (frequency).
   Result<ArmInfo> connect() override;
+  Status service() override;
 
   /// One package per call, in order. Bytes that break the protocol and joint angles that are not finite end the
   /// session.
@@ -49,7 +50,6 @@ class UrRtdeArm : public ArmDriver {
   /// command has expired, or tracks a target that is not finite.
   IoStatus write(const ArmCommand& command, TimePoint now) noexcept override;
 
-  [[nodiscard]] std::string_view reason() const noexcept override { return reason_.view(); }
   /// The last text message of the controller.
   [[nodiscard]] std::string_view last_text() const noexcept { return last_text_.view(); }
 
@@ -79,7 +79,6 @@ class UrRtdeArm : public ArmDriver {
   std::uint8_t input_recipe_{0};
   rtde::CommandPackage package_{};
   FixedString<120> last_text_;
-  FixedString<240> reason_;
 };
 
 }  // namespace embody

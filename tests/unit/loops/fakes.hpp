@@ -33,7 +33,6 @@ class FakeTracker : public HandTracker {
   Result<TrackerInfo> connect() override { return TrackerInfo{fd, 100.0, false, "fake tracker"}; }
   Status service() override { return {}; }
   IoStatus read(MarkerFrame& frame) noexcept override { return on_read(frame); }
-  [[nodiscard]] std::string_view reason() const noexcept override { return ""; }
 
   int fd{-1};
   std::function<IoStatus(MarkerFrame&)> on_read{[](MarkerFrame&) { return IoStatus::kEmpty; }};
@@ -50,7 +49,6 @@ class FakeHand : public HandDriver {
   }
   IoStatus read(HandDeviceState& state) noexcept override { return on_read(state); }
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override { return on_write(command, now); }
-  [[nodiscard]] std::string_view reason() const noexcept override { return ""; }
 
   int fd{-1};
   std::function<IoStatus(HandDeviceState&)> on_read{[](HandDeviceState&) { return IoStatus::kEmpty; }};
@@ -78,6 +76,7 @@ class FakeArm : public ArmDriver {
     state.tracking = false;
     return ArmInfo{fd, 500.0, "fake arm"};
   }
+  Status service() override { return {}; }
   IoStatus read(ArmState& out) noexcept override {
     const IoStatus status = script();
     if (status != IoStatus::kDone) return status;
@@ -88,7 +87,6 @@ class FakeArm : public ArmDriver {
     out = state;
     return status;
   }
-  [[nodiscard]] std::string_view reason() const noexcept override { return ""; }
   IoStatus write(const ArmCommand& command, TimePoint now) noexcept override {
     IoStatus status = now > command.t_expires ? IoStatus::kRefused : IoStatus::kDone;
     if (status == IoStatus::kDone) status = on_write(command);
