@@ -16,6 +16,9 @@ using robot::kNoIndex;
 constexpr Duration kUsualStep = std::chrono::milliseconds(10);
 constexpr std::size_t kScanned = 2;  // groups of so few motors start from a scan, others from the last frame
 constexpr Duration kLongGap = std::chrono::milliseconds(100);  // after which the last posture is no good start alone
+/// A finger of many joints has minima that end. It then goes on to the next one at this speed, 15 degrees in 10 ms:
+/// slower would be smoother, but off the minimum in more frames (docs/robot_hands.md has the figures).
+constexpr double kFastest_rad_s = 26.0;
 constexpr std::size_t kThumb = 0;
 
 /// Half the thickness of human finger tips, m: thumb, others.
@@ -38,6 +41,15 @@ bool finite(const HandState& state, FingerSet follows) noexcept {
 }
 
 }  // namespace
+
+StaticVector<MotorRange, kMaxHandJoints> HandGroup::within_reach() const noexcept {
+  StaticVector<MotorRange, kMaxHandJoints> nearby;
+  for (std::size_t i = 0; i < ranges.size(); ++i) {
+    const double from = start(static_cast<Index>(i));
+    nearby.push_back(ranges[i].within(from - reach_rad, from + reach_rad));
+  }
+  return nearby;
+}
 
 /// Which fingers are followed, and how sure each motor is.
 FingerSet EmbodimentMapping::rate(const HandState& state, FingerTarget& target) const noexcept {
@@ -139,10 +151,13 @@ void EmbodimentMapping::solve(HandGroup& group) noexcept {
 
 void EmbodimentMapping::solve_within(HandGroup& group, HandProblem& problem) const noexcept {
   const std::span<const MotorRange> ranges{group.ranges.begin(), group.ranges.size()};
-  if (known_) {
-    group.solution = solve_own(problem, ranges, group.start, options_);
-    if (group.ranges.size() > kScanned && dt_ <= kLongGap) return;
+  if (known_ && ranges.size() > kScanned && dt_ <= kLongGap) {
+    group.reach_rad = group.fingers.count() == 1 ? kFastest_rad_s * to_seconds(dt_) : kAnywhere;
+    const StaticVector<MotorRange, kMaxHandJoints> nearby = group.within_reach();
+    group.solution = solve_own(problem, {nearby.begin(), nearby.size()}, group.start, options_);
+    return;
   }
+  if (known_) group.solution = solve_own(problem, ranges, group.start, options_);
   constexpr double kClearlyBetter = 0.9;  // of the cost: two minima of about the same cost must not alternate
   HandProblem::Variables start = group.start;
   const HandSolution found = solve_everywhere(problem, ranges, start, options_);
@@ -237,7 +252,8 @@ void EmbodimentMapping::step(const HandState& state, FingerTarget& target) noexc
   target.valid = state.valid && finite(state, follows);
   if (target.valid) {
     constexpr Duration kShortest = std::chrono::milliseconds(1), kLongest = std::chrono::seconds(1);
-    dt_ = known_ ? std::clamp(state.t_capture - t_last_, kShortest, kLongest) : kUsualStep;
+    const bool running = known_ && state.t_capture > t_last_;  // a clock that stands still tells no time
+    dt_ = running ? std::clamp(state.t_capture - t_last_, kShortest, kLongest) : kUsualStep;
     t_last_ = state.t_capture;
     on_branch_ = std::min<Duration>(on_branch_ + dt_, std::chrono::hours(1));
     set_goal(state, follows);

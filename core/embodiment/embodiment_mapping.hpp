@@ -20,12 +20,19 @@ struct HandJointAngles {
   std::array<double, robot::kMaxHandLinks> q_rad{};  ///< in the order of EmbodimentMapping::urdf_joint_names()
 };
 
+inline constexpr double kAnywhere = 1e3;  ///< rad: more than any range
+
 /// Fingers that one solve moved together, because they share motors or touch.
 struct HandGroup {
   FingerSet fingers;
   HandProblem::Variables start;
   StaticVector<MotorRange, kMaxHandJoints> ranges;  ///< by variable
+  /// How far a motor may have come since the last frame: bounds one finger of many motors, whose minima end. Fingers
+  /// that touch or avoid each other are free, for a gap counts more than a leap; so is whatever is sought everywhere.
+  double reach_rad{kAnywhere};
   HandSolution solution;
+
+  [[nodiscard]] StaticVector<MotorRange, kMaxHandJoints> within_reach() const noexcept;
 };
 
 /// Finds the motor angles r that bring the robot's finger points nearest to the human's:

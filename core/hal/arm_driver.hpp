@@ -14,7 +14,8 @@ struct ArmInfo {
 
 /// A six-joint arm that streams states and takes one joint target per state. One session at a time. connect() and
 /// service() may block (at most about 5 s) and allocate; read() and write() neither block nor allocate. Calls never
-/// overlap, except service() with read() and write(). Connecting never moves anything; the destructor ends the session so that the arm stands still.
+/// overlap, except service() with read() and write(). Connecting never moves anything; the destructor ends the session
+/// so that the arm stands still.
 class ArmDriver : public Device {
  public:
   virtual ~ArmDriver() = default;

@@ -17,7 +17,8 @@ namespace embody::robot {
 namespace {
 
 constexpr XmlLimits kXmlLimits{kMaxUrdfBytes, kMaxUrdfDepth, 65'536};
-constexpr double kMaxLength = 1e3;  // m (or turns of rad); more is a unit mistake, and sums could overflow
+constexpr double kMaxLength = 1e3;    // m (or turns of rad); more is a unit mistake, and sums could overflow
+constexpr double kMostTurned = 25.2;  // rad, four turns; more are degrees
 
 /// Keeps the first two errors that urdfdom reports in this thread instead of printing them: first the cause, then the
 /// joint or link around it.
@@ -82,6 +83,7 @@ Status check_tree(const std::string& text) {
   for (auto* joint = robot->FirstChildElement("joint"); joint != nullptr; joint = joint->NextSiblingElement("joint")) {
     const std::string child = attribute(joint->FirstChildElement("child"), "link");
     const std::string parent = attribute(joint->FirstChildElement("parent"), "link");
+    if (attribute(joint, "name").empty()) return joint_error("", "needs a name");
     if (child.empty() || parent.empty()) {
       return joint_error(attribute(joint, "name"), "needs a parent link and a child link");
     }
@@ -138,9 +140,15 @@ Status set_limits(const urdf::Joint& source, Joint& joint) {
   if (bounded && !(std::abs(joint.lower) < kMaxLength && std::abs(joint.upper) < kMaxLength)) {
     return joint_error(joint.name, "has a limit that is not a finite angle or length");
   }
+  if (joint.type == JointType::kRevolute && std::max(-joint.lower, joint.upper) > kMostTurned) {
+    return joint_error(joint.name, "has a limit of more than four turns; URDF counts in radians");
+  }
   if (joint.lower > joint.upper) return joint_error(joint.name, "has a lower limit above its upper limit");
   if (!std::isfinite(joint.max_velocity) || !std::isfinite(joint.max_effort)) {
     return joint_error(joint.name, "has an effort or velocity limit that is not finite");
+  }
+  if (joint.max_velocity < 0.0 || joint.max_effort < 0.0) {
+    return joint_error(joint.name, "has an effort or velocity limit below zero");
   }
   return {};
 }

@@ -23,7 +23,7 @@ std::string suggestion(std::string_view name, const std::vector<std::string>& kn
   }
   if (best > 2) {
     for (const KeyName& other : all_keys()) {
-      if (other.key == name) return "; it belongs " + table_text(other.table);
+      if (other.key == name && !other.table.empty()) return "; it belongs " + table_text(other.table);
     }
   }
   return nearest.empty() ? std::string() : "; did you mean '" + std::string(nearest) + "'?";
