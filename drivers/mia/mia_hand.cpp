@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "drivers/mia/serial_line.hpp"
 #include "drivers/transport/clock.hpp"
-#include "drivers/transport/tty.hpp"
 
 namespace embody::mia {
 namespace {
@@ -15,7 +15,7 @@ constexpr std::size_t kSlots = kMotors + 1;
 constexpr Duration kRefresh = std::chrono::milliseconds(900);  ///< a motor hears its target at least once a second
 constexpr int kStopTries = 4;
 constexpr int kZeroSpeedCurrent_percent = 50;
-constexpr int kReadsPerCall = 4;  ///< of 256 bytes: far more than the line carries in 20 ms
+constexpr int kLinesPerCall = 64;  ///< far more than the line carries in 20 ms
 
 constexpr std::size_t at(Motor motor) noexcept {
   return static_cast<std::size_t>(motor);
@@ -23,7 +23,9 @@ constexpr std::size_t at(Motor motor) noexcept {
 
 }  // namespace
 
-MiaHand::MiaHand(MiaConfig config) : config_(std::move(config)) {}
+MiaHand::MiaHand(MiaConfig config) : config_(std::move(config)), open_(serial_line(config_.device)) {}
+
+MiaHand::MiaHand(MiaConfig config, OpenLine open) : config_(std::move(config)), open_(std::move(open)) {}
 
 MiaHand::~MiaHand() {
   end_session();
@@ -107,18 +109,12 @@ void MiaHand::drop_motion() noexcept {
 }
 
 void MiaHand::pump() noexcept {
-  for (int i = 0; i < kReadsPerCall; ++i) {
-    std::array<std::byte, 256> buffer;
-    const auto [status, size] = transport::read_tty(fd_.get(), buffer);
-    if (status == IoStatus::kDisconnected) {
-      hang_up();
-      return;
-    }
-    if (status == IoStatus::kEmpty) break;
-    const TimePoint t_arrival = transport::now();
-    for (std::size_t k = 0; k < size; ++k) {
-      if (lines_.push(static_cast<char>(buffer[k]))) take_line(lines_.line(), t_arrival);
-    }
+  for (int i = 0; i < kLinesPerCall; ++i) {
+    std::string_view line;
+    const IoStatus status = line_->receive(line);
+    if (status == IoStatus::kDisconnected) return hang_up();
+    if (status != IoStatus::kDone) break;
+    take_line(line, transport::now());
   }
   const TimePoint now = transport::now();
   if (bus_.waiting != Waiting::kNothing && now >= bus_.deadline) take_timeout();
@@ -216,9 +212,7 @@ void MiaHand::transmit(const Command& command, Sent what, TimePoint now) noexcep
   bus_.deadline = now + config_.ack_timeout;
   ++counters_.commands;
   // A full buffer needs no care of its own: the ACK will not come.
-  if (transport::write_tty(fd_.get(), std::as_bytes(std::span(command))) == IoStatus::kDisconnected) {
-    hang_up();
-  }
+  if (line_->send(command) == IoStatus::kDisconnected) hang_up();
 }
 
 void MiaHand::request_stop() noexcept {

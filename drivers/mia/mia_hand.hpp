@@ -1,11 +1,11 @@
 #pragma once
-// A Prensilia Mia hand on a serial line.
+// A Prensilia Mia hand on a serial line, or on another wire that carries its protocol.
 #include <string>
 
 #include "core/hal/hand_driver.hpp"
 #include "drivers/mia/codec.hpp"
+#include "drivers/mia/hand_line.hpp"
 #include "drivers/mia/transmission.hpp"
-#include "drivers/transport/unique_fd.hpp"
 
 namespace embody::mia {
 
@@ -43,7 +43,10 @@ struct MiaCounters {
 /// stop exchange is over. A kStop that was never acknowledged starts again with the next kStop.
 class MiaHand final : public HandDriver {
  public:
+  /// On the serial line `config.device`.
   explicit MiaHand(MiaConfig config);
+  /// On the wire that `open` opens; `config.device` is its name for people.
+  MiaHand(MiaConfig config, OpenLine open);
   ~MiaHand() override;
 
   Result<HandInfo> connect() override;
@@ -130,9 +133,9 @@ class MiaHand final : public HandDriver {
   void drop_motion() noexcept;
 
   MiaConfig config_;
-  transport::UniqueFd fd_;
+  OpenLine open_;
+  std::unique_ptr<HandLine> line_;  ///< empty: no session
   MiaCounters counters_;
-  LineAssembler lines_;
   bool lost_{true};     ///< the session is over
   bool hung_up_{true};  ///< and the line with it
   Bus bus_;

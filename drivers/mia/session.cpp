@@ -5,7 +5,7 @@
 
 #include "drivers/mia/mia_hand.hpp"
 #include "drivers/transport/clock.hpp"
-#include "drivers/transport/tty.hpp"
+#include "drivers/transport/tcp.hpp"
 
 namespace embody::mia {
 namespace {
@@ -17,59 +17,59 @@ constexpr Duration kGoodbyeTime = std::chrono::milliseconds(250);
 
 /// Sends `command` and waits for its ACK and from there on for a line that `done` accepts (it may be the ACK itself).
 template <class Done>
-bool exchange(int fd, const Command& command, TimePoint deadline, Done done) {
-  LineAssembler lines;
+bool exchange(HandLine& line, const Command& command, TimePoint deadline, Done done) {
   bool acknowledged = false;
-  if (transport::write_tty(fd, std::as_bytes(std::span(command))) != IoStatus::kDone) return false;
-  while (transport::now() < deadline && transport::wait_readable(fd, deadline)) {
-    std::array<std::byte, 256> buffer;
-    const auto [status, size] = transport::read_tty(fd, buffer);
+  if (line.send(command) != IoStatus::kDone) return false;
+  while (transport::now() < deadline) {
+    std::string_view text;
+    const IoStatus status = line.receive(text);
     if (status == IoStatus::kDisconnected) return false;
-    for (std::size_t i = 0; i < size; ++i) {
-      if (!lines.push(static_cast<char>(buffer[i]))) continue;
-      acknowledged = acknowledged || acknowledges(lines.line(), command);
-      if (acknowledged && done(lines.line())) return true;
+    if (status != IoStatus::kDone) {
+      if (!transport::wait_readable(line.fd(), deadline)) return false;
+      continue;
     }
+    acknowledged = acknowledged || acknowledges(text, command);
+    if (acknowledged && done(text)) return true;
   }
   return false;
 }
 
-bool answers_ping(int fd, TimePoint deadline) {
+bool answers_ping(HandLine& line, TimePoint deadline) {
   for (bool old_ping = false; transport::now() < deadline; old_ping = !old_ping) {
     const TimePoint until = std::min(deadline, transport::now() + kProbeStep);
     const Command ping = encode_plain(old_ping ? kOldPingPayload : kPingPayload);
-    if (exchange(fd, ping, until, [](std::string_view) { return true; })) return true;
-    if (!transport::wait_readable(fd, until)) continue;
-    std::array<std::byte, 256> buffer;  // a dead line is readable at once: do not spin on it
-    if (transport::read_tty(fd, buffer).status == IoStatus::kDisconnected) return false;
+    if (exchange(line, ping, until, [](std::string_view) { return true; })) return true;
+    if (!transport::wait_readable(line.fd(), until)) continue;
+    std::string_view rubbish;  // a dead line is readable at once: do not spin on it
+    if (line.receive(rubbish) == IoStatus::kDisconnected) return false;
   }
   return false;
 }
 
-std::optional<std::array<int, kMotors>> ask_positions(int fd, TimePoint deadline) {
+std::optional<std::array<int, kMotors>> ask_positions(HandLine& line, TimePoint deadline) {
   std::optional<std::array<int, kMotors>> counts;
-  const auto is_position = [&counts](std::string_view line) {
-    counts = parse_triple(line, TripleLine::kPosition);
+  const auto is_position = [&counts](std::string_view text) {
+    counts = parse_triple(text, TripleLine::kPosition);
     return counts.has_value();
   };
   for (int i = 0; i < 3; ++i) {
     const TimePoint until = std::min(deadline, transport::now() + kProbeStep);
-    if (exchange(fd, encode_plain(kReadPositionsPayload), until, is_position)) break;
+    if (exchange(line, encode_plain(kReadPositionsPayload), until, is_position)) break;
   }
   return counts;
 }
 
-FixedString<28> ask_firmware_id(int fd) {
+FixedString<28> ask_firmware_id(HandLine& line) {
   FixedString<28> text("firmware id unknown");
-  const auto is_firmware = [&text](std::string_view line) {
-    const auto id = parse_firmware_id(line);
+  const auto is_firmware = [&text](std::string_view reply) {
+    const auto id = parse_firmware_id(reply);
     if (!id) return false;
     std::array<char, 28> printable{};
     std::transform(id->begin(), id->end(), printable.begin(), [](char c) { return c >= ' ' && c <= '~' ? c : '?'; });
     text = std::string_view(printable.data(), id->size());
     return true;
   };
-  exchange(fd, encode_plain(kFirmwareIdPayload), transport::now() + kProbeStep, is_firmware);
+  exchange(line, encode_plain(kFirmwareIdPayload), transport::now() + kProbeStep, is_firmware);
   return text;
 }
 
@@ -94,15 +94,14 @@ Status check_config(const MiaConfig& config) {
 Result<HandInfo> MiaHand::connect() {
   end_session();
   if (const Status usable = check_config(config_); !usable) return usable.error();
-  auto tty = transport::open_tty(config_.device);
-  if (!tty) return tty.error();
-  fd_ = std::move(tty->fd);
+  auto line = open_();
+  if (!line) return line.error();
+  line_ = std::move(*line);
   auto info = probe();
   if (!info) {
-    fd_.reset();
+    line_.reset();
     return info;
   }
-  lines_.clear();
   bus_ = {};
   cycle_ = {};
   told_ = {};
@@ -113,13 +112,12 @@ Result<HandInfo> MiaHand::connect() {
 }
 
 Result<HandInfo> MiaHand::probe() {
-  const int fd = fd_.get();
   const char* device = config_.device.c_str();
   const TimePoint deadline = transport::now() + kProbeTime;
-  if (!answers_ping(fd, deadline)) {
+  if (!answers_ping(*line_, deadline)) {
     return make_error(Errc::kTimeout, "no Mia hand answers at %s: check power, cable and device name", device);
   }
-  const auto counts = ask_positions(fd, deadline);
+  const auto counts = ask_positions(*line_, deadline);
   if (!counts) {
     return make_error(Errc::kUnsupported,
                       "the hand at %s answers but reports no motor positions: its firmware lacks one-shot reads",
@@ -128,19 +126,19 @@ Result<HandInfo> MiaHand::probe() {
   reply_ = {};
   std::copy(counts->begin(), counts->end(), reply_.counts.begin());
   HandInfo info;
-  info.fd = fd;
+  info.fd = line_->fd();
   info.rate_hz = kRate_hz;
   info.joint_count = kMotors;
   for (std::size_t i = 0; i < kMotors; ++i) info.joint_names[i] = kJointNames[i];
   std::array<char, 121> peer{};
-  std::snprintf(peer.data(), peer.size(), "Mia hand at %s, %s", device, ask_firmware_id(fd).c_str());
+  std::snprintf(peer.data(), peer.size(), "Mia hand at %s, %s", device, ask_firmware_id(*line_).c_str());
   info.peer = peer.data();
   return info;
 }
 
 void MiaHand::end_session() noexcept {
-  if (!fd_ || hung_up_) {
-    fd_.reset();
+  if (!line_ || hung_up_) {
+    line_.reset();
     return;
   }
   stop_.acknowledged = false;  // say it again, whatever was said before
@@ -151,12 +149,12 @@ void MiaHand::end_session() noexcept {
   const auto busy = [this] { return stop_.phase != StopPhase::kOver || bus_.waiting != Waiting::kNothing; };
   while (busy() && !lost_ && transport::now() < deadline) {
     if (bus_.waiting != Waiting::kNothing) {
-      static_cast<void>(transport::wait_readable(fd_.get(), std::min(deadline, bus_.deadline)));
+      static_cast<void>(transport::wait_readable(line_->fd(), std::min(deadline, bus_.deadline)));
     }
     pump();
   }
   lost_ = hung_up_ = true;
-  fd_.reset();
+  line_.reset();
 }
 
 }  // namespace embody::mia
