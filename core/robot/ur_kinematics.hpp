@@ -2,6 +2,9 @@
 // Kinematics of Universal Robots arms (three parallel joints, offset wrist): pure functions, no heap, no exceptions.
 // Geometry is nominal: each arm carries factory calibration deltas, so a nominal pose differs from the controller's by
 // some millimetres. Use it for relative motion, or correct with a measured base pose.
+#include <array>
+#include <cstdint>
+
 #include "core/base/result.hpp"
 #include "core/base/static_vector.hpp"
 #include "core/math/pose.hpp"
@@ -22,8 +25,32 @@ struct UrGeometry {
   double d6_m{0.0};
 };
 
-/// UR10e. Source: Universal Robots, "DH parameters for calculations of kinematics and dynamics".
-inline constexpr UrGeometry kUr10e{0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655};
+/// An arm that can be bought. Source of the lengths: Universal Robots, "DH parameters for calculations of kinematics
+/// and dynamics" (nominal values).
+struct UrModel {
+  const char* name;
+  int software_major;  ///< 3: CB-Series, 5: e-Series
+  UrGeometry geometry;
+};
+enum class UrArm : std::uint8_t { kUr3e, kUr5e, kUr10e, kUr16e, kUr3, kUr5, kUr10 };
+inline constexpr std::array<UrModel, 7> kUrModels{{
+    {"ur3e", 5, {0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921}},
+    {"ur5e", 5, {0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996}},
+    {"ur10e", 5, {0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655}},
+    {"ur16e", 5, {0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655}},
+    {"ur3", 3, {0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819}},
+    {"ur5", 3, {0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823}},
+    {"ur10", 3, {0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922}},
+}};
+inline constexpr auto kUrModelNames = [] {
+  std::array<const char*, kUrModels.size()> names{};
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = kUrModels[i].name;
+  return names;
+}();
+[[nodiscard]] constexpr const UrModel& model_of(UrArm arm) noexcept {
+  return kUrModels[static_cast<std::size_t>(arm)];
+}
+inline constexpr UrGeometry kUr10e = model_of(UrArm::kUr10e).geometry;
 
 inline constexpr std::size_t kMaxUrSolutions = 8;
 using UrSolutions = StaticVector<Vector6, kMaxUrSolutions>;

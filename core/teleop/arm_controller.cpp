@@ -36,16 +36,17 @@ std::optional<Pose> ArmController::target(TimePoint now) const noexcept {
 bool ArmController::track_measured(TimePoint now, const Vector6& q_rad) noexcept {
   gate_.reset(q_rad);
   q_d_rad_ = q_rad;
-  X_BEr_ = robot::forward_kinematics(q_rad);
+  X_BEr_ = robot::forward_kinematics(q_rad, config_.geometry);
   const std::optional<Pose> X_BEt = target(now);
   if (!X_BEt || !math::is_valid(*X_BEt)) return false;
   X_BEd_ = config_.clutch == Clutch::kAbsolute ? *X_BEt : X_BEr_;
-  return inside(config_.workspace_B, X_BEd_.translation()) && robot::solve_nearest(X_BEd_, q_rad, range_).ok();
+  return inside(config_.workspace_B, X_BEd_.translation()) &&
+         robot::solve_nearest(X_BEd_, q_rad, range_, config_.geometry).ok();
 }
 
 void ArmController::engage(TimePoint now) noexcept {
   q_d_rad_ = gate_.q_rad();
-  X_BEr_ = robot::forward_kinematics(q_d_rad_);
+  X_BEr_ = robot::forward_kinematics(q_d_rad_, config_.geometry);
   const Pose X_BEt = target(now).value_or(X_BEr_);
   p_offset_B_ = X_BEr_.translation() - X_BEt.translation();
   R_offset_ = X_BEt.linear().transpose() * X_BEr_.linear();
@@ -60,7 +61,7 @@ ArmReference ArmController::follow(TimePoint now, double dt_s) noexcept {
   ArmReference reference;
   reference.X_BEd = X_BEd_;
   const Pose X_BEn = limit_step(X_BEd_, dt_s);
-  const Result<Vector6> q = robot::solve_nearest(X_BEn, q_d_rad_, range_);
+  const Result<Vector6> q = robot::solve_nearest(X_BEn, q_d_rad_, range_, config_.geometry);
   const bool solved = q.ok() && (*q - q_d_rad_).cwiseAbs().maxCoeff() < kLargestStep_rad;
   Vector6 qd_d = Vector6::Zero();
   if (solved) {
@@ -68,7 +69,8 @@ ArmReference ArmController::follow(TimePoint now, double dt_s) noexcept {
     q_d_rad_ = *q;
     X_BEr_ = X_BEn;
   }
-  const safety::FlangeLimit flange{robot::jacobian(gate_.q_rad()), config_.speed_m_s, config_.speed_rad_s};
+  const safety::FlangeLimit flange{robot::jacobian(gate_.q_rad(), config_.geometry), config_.speed_m_s,
+                                   config_.speed_rad_s};
   gate_.follow(q_d_rad_, qd_d, dt_s, &flange);
   reference.q_rad = gate_.q_rad();
   reference.qd_rad_s = gate_.qd_rad_s();
@@ -79,7 +81,7 @@ ArmReference ArmController::follow(TimePoint now, double dt_s) noexcept {
 ArmReference ArmController::brake(double dt_s) noexcept {
   gate_.brake(dt_s);
   q_d_rad_ = gate_.q_rad();
-  X_BEr_ = robot::forward_kinematics(q_d_rad_);
+  X_BEr_ = robot::forward_kinematics(q_d_rad_, config_.geometry);
   X_BEd_ = X_BEr_;
   return {X_BEd_, gate_.q_rad(), gate_.qd_rad_s(), false};
 }

@@ -18,6 +18,7 @@ struct Box {
 };
 
 struct ArmControllerConfig {
+  robot::UrGeometry geometry = robot::kUr10e;
   Pose X_BW{Pose::Identity()};
   Pose X_PM{Pose::Identity()};
   Pose X_EP{Pose::Identity()};

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/hal/types.hpp"
+#include "core/robot/ur_kinematics.hpp"
 #include "daemon/app/config_embodiment.hpp"
 #include "daemon/app/config_field.hpp"
 #include "daemon/app/config_operator.hpp"
@@ -107,6 +108,7 @@ inline constexpr std::array<const char*, 2> kClutchNames{"absolute", "relative"}
 
 struct ArmConfig {
   std::string driver{"ur_rtde"};
+  robot::UrArm model{robot::UrArm::kUr10e};
   std::string host{"127.0.0.1"};
   int port{30004};
   double frequency_hz{500.0};
@@ -119,6 +121,7 @@ struct ArmConfig {
   template <class V>
   void visit(V& v) {
     v.field("driver", driver, "Which driver moves the arm.");
+    v.choice("model", model, robot::kUrModelNames, "The arm; its kinematics are the vendor's nominal ones.");
     v.field("host", host, "Name or address of the arm's controller.");
     v.field("port", port, Range{1, 65535}, "TCP port of the controller's real-time data exchange (RTDE).");
     v.field("frequency_hz", frequency_hz, Range{50, 500},

@@ -126,7 +126,8 @@ Daemon::Daemon(const config::EmbodyConfig& config, const Models& models, std::un
       arm_loop_(arm_baton_, tracker_baton_, models.arm, mode_config(config.safety), arm_loop_config(config), edges_),
       hand_loop_(hand_baton_, hand_gate_config(config), {from_seconds(1.0 / config.hand.rate_hz)}, edges_),
       watchdog_loop_(arm_baton_, edges_),
-      telemetry_(std::make_unique<TelemetryLoop>(edges_, std::move(publisher), models.embodiment, models.glove)),
+      telemetry_(std::make_unique<TelemetryLoop>(edges_, std::move(publisher), models.embodiment, models.glove,
+                                                 models.arm.geometry)),
       links_(std::make_unique<LinksLoop>(
           make_links(), embody::LinksConfig{config.links.retry_first, config.links.retry_longest}, edges_)) {}
 

@@ -51,6 +51,7 @@ teleop::ArmControllerConfig make_arm(const config::EmbodyConfig& config, const P
   controller.X_BW = math::pose_from(vector3(config.cell.p_WB_m), vector3(config.cell.r_WB_rad)).inverse();
   controller.X_EP = math::pose_from(vector3(config.cell.p_EP_m), vector3(config.cell.r_EP_rad));
   controller.X_PM = X_PM;
+  controller.geometry = robot::model_of(arm.model).geometry;
   controller.clutch = arm.clutch == config::Clutch::kAbsolute ? teleop::Clutch::kAbsolute : teleop::Clutch::kRelative;
   controller.blend_speed_m_s = arm.blend_speed_m_s;
   controller.blend_speed_rad_s = arm.blend_speed_rad_s;

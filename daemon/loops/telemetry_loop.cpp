@@ -19,8 +19,8 @@ constexpr std::array<const char*, 6> kArmJoints{"shoulder_pan_joint", "shoulder_
 }  // namespace
 
 TelemetryLoop::TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand,
-                             const hand::GloveLayout& glove)
-    : edges_(edges), publisher_(std::move(publisher)), hand_(std::move(hand)), markers_(glove) {
+                             const hand::GloveLayout& glove, const robot::UrGeometry& arm)
+    : edges_(edges), publisher_(std::move(publisher)), hand_(std::move(hand)), markers_(glove), arm_(arm) {
   joint_names_.assign(kArmJoints.begin(), kArmJoints.end());
   joint_names_.insert(joint_names_.end(), hand_.urdf_joint_names().begin(), hand_.urdf_joint_names().end());
 }
@@ -104,7 +104,7 @@ void TelemetryLoop::take_timings() {
 
 void TelemetryLoop::measure_errors() {
   if (!is_moving_mode(data_.mode.mode)) return;
-  const Pose X_BE = robot::forward_kinematics(data_.arm.q_rad);
+  const Pose X_BE = robot::forward_kinematics(data_.arm.q_rad, arm_);
   data_.arm_error_m = (X_BE.translation() - X_BEd_.translation()).norm();
   data_.arm_error_rad = math::angle_between(X_BE.linear(), X_BEd_.linear());
   double error = 0.0;

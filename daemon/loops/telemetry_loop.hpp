@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/embodiment/embodiment_mapping.hpp"
+#include "core/robot/ur_kinematics.hpp"
 #include "daemon/app/histogram.hpp"
 #include "daemon/dds/publisher.hpp"
 #include "daemon/loops/marker_watch.hpp"
@@ -45,8 +46,10 @@ struct TelemetrySnapshot {
 
 class TelemetryLoop {
  public:
-  /// `hand` names and completes the hand's joints for the topics, `glove` names the markers.
-  TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand, const hand::GloveLayout& glove);
+  /// `hand` names and completes the hand's joints for the topics, `glove` names the markers, `arm` tells where the
+  /// flange is.
+  TelemetryLoop(Edges& edges, DdsPublisher publisher, EmbodimentMapping hand, const hand::GloveLayout& glove,
+                const robot::UrGeometry& arm);
   /// Until edges.stop.
   void run();
   /// Any thread.
@@ -76,6 +79,7 @@ class TelemetryLoop {
   FingerReport fingers_;
   HandReport hand_report_;
   MarkerWatch markers_;
+  robot::UrGeometry arm_;
   bool new_pose_{false};
   bool new_fingers_{false};
   bool new_arm_{false};

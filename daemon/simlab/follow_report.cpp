@@ -71,12 +71,13 @@ struct Actual {
 };
 
 /// The flange on a 10 ms grid within [begin, end].
-std::vector<Actual> flange_path(const std::vector<UrSample>& arm, TimePoint begin, TimePoint end) {
+std::vector<Actual> flange_path(const std::vector<UrSample>& arm, const robot::UrGeometry& geometry, TimePoint begin,
+                                TimePoint end) {
   std::vector<Actual> path;
   TimePoint next = begin;
   for (const UrSample& sample : arm) {
     if (sample.t < next || sample.t > end) continue;
-    path.push_back({sample.t, robot::forward_kinematics(sample.q_rad)});
+    path.push_back({sample.t, robot::forward_kinematics(sample.q_rad, geometry)});
     next = sample.t + kGrid - kGrid / 4;
   }
   return path;
@@ -228,7 +229,7 @@ FollowReport judge(const std::vector<TargetSample>& targets, const std::vector<U
     return report;
   }
   judge_engagement(arm, begin, end, report);
-  judge_arm(targets, flange_path(arm, begin, end), criteria, report);
+  judge_arm(targets, flange_path(arm, criteria.arm, begin, end), criteria, report);
   judge_hand(targets, hand, begin, end, criteria, report);
   report.reason = first_failure(report, criteria);
   report.followed = report.reason.empty();

@@ -14,6 +14,7 @@ namespace embody::sim {
 
 /// What counts as following.
 struct FollowCriteria {
+  robot::UrGeometry arm = robot::kUr10e;
   Duration settle{std::chrono::seconds(3)};        ///< after the robot began to track, the clutch offset shrinks
   Duration start_within{std::chrono::seconds(5)};  ///< of the start of playback: tracking must have begun
   Duration largest_lag{std::chrono::milliseconds(250)};

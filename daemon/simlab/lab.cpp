@@ -21,7 +21,7 @@ Result<Vector6> start_joints(const Models& models, const recording::Recording& r
     robot::UrJointRange range;
     range.lower_rad = models.arm.joints.lower_rad;
     range.upper_rad = models.arm.joints.upper_rad;
-    Result<Vector6> q = robot::solve_nearest(X_BE, q_usual, range);
+    Result<Vector6> q = robot::solve_nearest(X_BE, q_usual, range, models.arm.geometry);
     if (q.ok()) return q;
     return make_error(Errc::kInvalidArgument,
                       "the recording starts out of the arm's reach in this cell (%s): change [cell] p_WB_m",
@@ -132,6 +132,7 @@ Status Lab::fault(const std::string& command) {
 std::string Lab::report_json() const {
   const std::vector<SentFrame> sent = qtm_.log();
   FollowCriteria criteria;
+  criteria.arm = models_.arm.geometry;
   criteria.planned = from_seconds(static_cast<double>(recording_.frames.size()) / recording_.rate_hz);
   const FollowReport report = judge(ungated_targets(models_, recording_, sent), ur_.samples(), mia_.log(), criteria);
   const UrCounters ur = ur_.counters();

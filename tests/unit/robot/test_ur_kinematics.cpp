@@ -101,6 +101,21 @@ TEST(UrInverseKinematics, EverySolutionOfRandomPosesReachesThePoseAndOneIsTheOri
   EXPECT_GT(with_eight, 7'000U);  // most poses have all eight
 }
 
+TEST(UrInverseKinematics, IsExactForEveryModel) {
+  RandomJoints random_joints(/*seed=*/8);
+  for (const UrModel& model : kUrModels) {
+    for (int i = 0; i < 1'000; ++i) {
+      const Vector6 q = random_joints();
+      const Pose X_BE = forward_kinematics(q, model.geometry);
+      const UrSolutions solutions = inverse_kinematics(X_BE, q[5], model.geometry);
+      ASSERT_FALSE(solutions.empty()) << model.name << " " << q.transpose();
+      for (const Vector6& solution : solutions) {
+        ASSERT_LE(pose_error(forward_kinematics(solution, model.geometry), X_BE), 1e-9) << model.name;
+      }
+    }
+  }
+}
+
 TEST(UrInverseKinematics, StaysExactHoweverCloseTheArmIsToASingularity) {
   RandomJoints random_joints(/*seed=*/31);
   for (int i = 0; i < 5'000; ++i) {
