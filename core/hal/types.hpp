@@ -37,6 +37,13 @@ struct Marker {
   float confidence{1.0F};  ///< 0..1 for sensors that tell how sure they are
 };
 
+/// Pose of a rigid body that the sensor tracks by itself.
+struct RigidBody {
+  Pose X_W{Pose::Identity()};  ///< of the body in the motion-capture world; meaningless unless visible
+  double residual_m{0.0};      ///< how far its markers are from their known places, mean; 0 when the sensor tells none
+  bool visible{false};
+};
+
 /// One measurement of the tracker. `markers[i]` is the i-th name of the configured glove layout, whatever the sensor's
 /// order; a landmark tracker fills the 21 slots of core/hand/landmark_layout.hpp.
 struct MarkerFrame {
@@ -46,6 +53,7 @@ struct MarkerFrame {
   TimePoint t_arrival{};          ///< bytes read from the kernel
   std::size_t count{0};
   std::array<Marker, kMaxMarkers> markers{};
+  RigidBody body;  ///< on the back of the hand, where the sensor is told to track one; not visible otherwise
 };
 
 /// Pose of the hand in the motion-capture world: the cheap half of the record mapping.

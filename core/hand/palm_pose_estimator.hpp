@@ -80,7 +80,7 @@ class PoseEstimator {
   /// What became of the glove's back markers in the last frame; null with landmarks.
   [[nodiscard]] const TriadCheck* triad() const noexcept {
     const auto* glove = std::get_if<HandPoseEstimator>(&kind_);
-    return glove != nullptr ? &glove->triad() : nullptr;
+    return glove != nullptr && !glove->follows_body() ? &glove->triad() : nullptr;
   }
 
  private:

@@ -12,7 +12,32 @@ class PoseMonitor {
   /// `gap`: a longer time between two poses begins a new streak.
   explicit PoseMonitor(Duration gap = std::chrono::milliseconds(50)) noexcept : gap_(gap) {}
 
+  /// Markers may be others than before, or the sensor's clock has begun anew: nothing is known, and the next
+  /// `kProbation` good poses do not count yet.
+  void restart() noexcept {
+    started_ = false;
+    suspects_ = streak_ = 0;
+    probation_ = kProbation;
+  }
+
   void step(HandPose& pose) noexcept {
+    judge(pose);
+    if (probation_ == 0 || !pose.valid) return;
+    --probation_;
+    pose.valid = false;
+    pose.streak = streak_ = 0;
+  }
+
+ private:
+  // Peak wrist speed of fast reaching is about 3 m/s, of fast turning about 15 rad/s; the rest is measurement noise.
+  static constexpr double kSpeed_m_s = 5.0;
+  static constexpr double kSpeed_rad_s = 30.0;
+  static constexpr double kNoise_m = 0.01;
+  static constexpr double kNoise_rad = 0.1;
+  static constexpr std::uint32_t kAcceptAfter = 5;
+  static constexpr std::uint32_t kProbation = 50;
+
+  void judge(HandPose& pose) noexcept {
     if (!pose.valid || !math::is_valid(pose.X_WM)) {
       pose.valid = false;
       streak_ = 0;
@@ -37,14 +62,6 @@ class PoseMonitor {
     pose.jumps = jumps_;
   }
 
- private:
-  // Peak wrist speed of fast reaching is about 3 m/s, of fast turning about 15 rad/s; the rest is measurement noise.
-  static constexpr double kSpeed_m_s = 5.0;
-  static constexpr double kSpeed_rad_s = 30.0;
-  static constexpr double kNoise_m = 0.01;
-  static constexpr double kNoise_rad = 0.1;
-  static constexpr std::uint32_t kAcceptAfter = 5;
-
   [[nodiscard]] static bool plausible(const HandPose& pose, const HandPose& before) noexcept {
     const double dt_s = std::max(0.0, to_seconds(pose.t_capture - before.t_capture));
     const double distance = (pose.X_WM.translation() - before.X_WM.translation()).norm();
@@ -58,6 +75,7 @@ class PoseMonitor {
   bool started_{false};
   std::uint32_t suspects_{0};
   std::uint32_t streak_{0};
+  std::uint32_t probation_{0};
   std::uint32_t jumps_{0};
 };
 

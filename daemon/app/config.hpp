@@ -8,54 +8,13 @@
 #include <vector>
 
 #include "core/hal/types.hpp"
-#include "core/robot/ur_kinematics.hpp"
-#include "daemon/app/config_embodiment.hpp"
+#include "daemon/app/config_devices.hpp"
 #include "daemon/app/config_field.hpp"
 #include "daemon/app/config_operator.hpp"
 
 namespace embody::config {
 
 inline constexpr int kSchema = 1;  ///< raised when, after a release, a key changes its meaning or disappears
-
-/// Where a tracker of hand landmarks sends its datagrams (docs/landmarks.md).
-struct LandmarkConfig {
-  std::string address{"127.0.0.1"};
-  int port{21021};
-  double rate_hz{30.0};
-
-  template <class V>
-  void visit(V& v) {
-    v.field("address", address,
-            "IPv4 address of the interface to receive at. Whoever can send to it moves the hand: not the loopback only "
-            "in a network of its own.");
-    v.field("port", port, Range{1, 65535}, "UDP port.");
-    v.field("rate_hz", rate_hz, Range{10, 1000}, "Frames per second that the sender nominally makes.");
-  }
-};
-
-enum class TrackerDriver : std::uint8_t { kQualisys, kLandmarks };
-inline constexpr std::array<const char*, 2> kTrackerDriverNames{"qualisys", "landmarks"};
-
-struct TrackerConfig {
-  TrackerDriver driver{TrackerDriver::kQualisys};
-  std::string host{"127.0.0.1"};
-  int port{22223};
-  bool allow_playback{false};
-  LandmarkConfig landmarks;
-
-  template <class V>
-  void visit(V& v) {
-    v.choice("driver", driver, kTrackerDriverNames,
-             "qualisys: a marker glove, from Qualisys Track Manager (QTM); landmarks: 21 hand landmarks that a "
-             "camera-based tracker sends as datagrams. `[glove]` and `X_HM_exponential` belong to the glove.");
-    v.field("host", host, "qualisys: name or address of the tracking computer.");
-    v.field("port", port, Range{1, 65535}, "qualisys: TCP port; 22223 is the little-endian real-time port of QTM.");
-    v.field("allow_playback", allow_playback,
-            "qualisys: accept a recording that the tracking computer plays back. Off: a robot follows live "
-            "measurements only.");
-    v.section("landmarks", landmarks, "Used with `driver = \"landmarks\"`.");
-  }
-};
 
 /// Where things stand in the robot cell.
 struct CellConfig {
@@ -73,90 +32,6 @@ struct CellConfig {
     v.field("r_EP_rad", r_EP_rad, Range{-2 * kPi, 2 * kPi},
             "Robot hand P in the arm's flange E: rotation vector. The default turns y_P to z_E and z_P to -y_E.");
   }
-};
-
-/// What no command to the arm exceeds, whatever the operator's hand does.
-struct ArmLimitsConfig {
-  double speed_m_s{0.25};
-  double speed_rad_s{1.0};
-  std::array<double, 6> joint_speed_rad_s{1.0, 1.0, 1.5, 2.0, 2.0, 2.0};
-  std::array<double, 6> joint_acceleration_rad_s2{4.0, 4.0, 6.0, 10.0, 10.0, 10.0};
-  std::array<double, 6> joint_lower_rad{-2 * kPi, -2 * kPi, -kPi, -2 * kPi, -2 * kPi, -2 * kPi};
-  std::array<double, 6> joint_upper_rad{2 * kPi, 2 * kPi, kPi, 2 * kPi, 2 * kPi, 2 * kPi};
-  std::array<double, 3> workspace_min_m{-1.2, -1.2, -0.2};
-  std::array<double, 3> workspace_max_m{1.2, 1.2, 1.3};
-
-  template <class V>
-  void visit(V& v) {
-    v.field("speed_m_s", speed_m_s, Range{0.001, 3}, "Greatest speed of the flange.");
-    v.field("speed_rad_s", speed_rad_s, Range{0.001, 10}, "Greatest turning speed of the flange.");
-    v.field("joint_speed_rad_s", joint_speed_rad_s, Range{0.001, 3.2}, "Greatest speed of each joint, base first.");
-    v.field("joint_acceleration_rad_s2", joint_acceleration_rad_s2, Range{0.01, 40},
-            "Greatest acceleration of each joint.");
-    v.field("joint_lower_rad", joint_lower_rad, Range{-2 * kPi, 2 * kPi}, "Lower end of each joint's range.");
-    v.field("joint_upper_rad", joint_upper_rad, Range{-2 * kPi, 2 * kPi}, "Upper end of each joint's range.");
-    v.field("workspace_min_m", workspace_min_m, Range{-2, 2},
-            "Lower corner of the box (frame B) that the flange may "
-            "be in.");
-    v.field("workspace_max_m", workspace_max_m, Range{-2, 2}, "Upper corner of that box.");
-  }
-  [[nodiscard]] std::string problem() const;
-};
-
-enum class Clutch : std::uint8_t { kAbsolute, kRelative };
-inline constexpr std::array<const char*, 2> kClutchNames{"absolute", "relative"};
-
-struct ArmConfig {
-  std::string driver{"ur_rtde"};
-  robot::UrArm model{robot::UrArm::kUr10e};
-  std::string host{"127.0.0.1"};
-  int port{30004};
-  double frequency_hz{500.0};
-  Clutch clutch{Clutch::kAbsolute};
-  double blend_speed_m_s{0.25};
-  double blend_speed_rad_s{0.8};
-  milliseconds resample_delay{25};
-  ArmLimitsConfig limits;
-
-  template <class V>
-  void visit(V& v) {
-    v.field("driver", driver, "Which driver moves the arm.");
-    v.choice("model", model, robot::kUrModelNames, "The arm; its kinematics are the vendor's nominal ones.");
-    v.field("host", host, "Name or address of the arm's controller.");
-    v.field("port", port, Range{1, 65535}, "TCP port of the controller's real-time data exchange (RTDE).");
-    v.field("frequency_hz", frequency_hz, Range{50, 500},
-            "Packages per second: 500 for e-Series, 125 for CB3. The controller sends a whole part of its own rate.");
-    v.choice("clutch", clutch, kClutchNames,
-             "absolute: the robot goes where the hand is; relative: it repeats the motion since engaging.");
-    v.field("blend_speed_m_s", blend_speed_m_s, Range{0.001, 3},
-            "Speed at which the robot catches up with the hand after engaging.");
-    v.field("blend_speed_rad_s", blend_speed_rad_s, Range{0.001, 10}, "The same for the orientation.");
-    v.field("resample_delay_ms", resample_delay, Range{0, 200},
-            "The hand pose is interpolated this far in the past, so that 100 Hz frames become a smooth 500 Hz path.");
-    v.section("limits", limits, "What no command to the arm exceeds.");
-  }
-};
-
-struct HandConfig {
-  std::string driver{"mia"};
-  std::string device{"/dev/ttyUSB0"};
-  double rate_hz{20.0};
-  int speed_percent{60};
-  double joint_speed_rad_s{2.0};
-  EmbodimentConfig embodiment;  ///< its keys are in this same table
-
-  template <class V>
-  void visit(V& v) {
-    v.file_key("hands/mia.toml", "Hand file with keys of this table (`hands/*.toml`).");
-    v.field("driver", driver, "Which driver moves the robot hand.");
-    v.field("device", device, "Serial device of the hand.");
-    v.field("rate_hz", rate_hz, Range{1, 500}, "Commands per second.");
-    v.field("speed_percent", speed_percent, Range{1, 99}, "Speed of the motors, part of the greatest one.");
-    v.field("joint_speed_rad_s", joint_speed_rad_s, Range{0.01, 20},
-            "Greatest speed of the joint targets that are sent.");
-    v.merge(embodiment);
-  }
-  [[nodiscard]] std::string problem() const;
 };
 
 struct SafetyConfig {

@@ -4,50 +4,16 @@
 
 #include <algorithm>
 #include <thread>
-#include <tuple>
 
+#include "daemon/app/devices.hpp"
 #include "daemon/app/heap_guard.hpp"
-#include "daemon/app/trackers.hpp"
-#include "drivers/mia/mia_hand.hpp"
+#include "drivers/mia/can_line.hpp"
 #include "drivers/transport/clock.hpp"
-#include "drivers/ur_rtde/ur_rtde_arm.hpp"
 
 namespace embody {
 namespace {
 
 using transport::now;
-
-std::unique_ptr<ArmDriver> make_arm(const config::ArmConfig& config) {
-  UrRtdeConfig ur;
-  ur.host = config.host;
-  ur.port = static_cast<std::uint16_t>(config.port);
-  ur.frequency_hz = config.frequency_hz;
-  return std::make_unique<UrRtdeArm>(ur);
-}
-
-std::unique_ptr<HandDriver> make_hand(const config::HandConfig& config) {
-  mia::MiaConfig mia;
-  mia.device = config.device;
-  mia.speed_percent = config.speed_percent;
-  return std::make_unique<mia::MiaHand>(mia);
-}
-
-/// Does the hand's file belong to the driver, and to the operator's hand?
-Status check_hand(const config::EmbodyConfig& config) {
-  const EmbodimentConfig& hand = config.hand.embodiment;
-  if (!std::equal(hand.motors.begin(), hand.motors.end(), mia::kJointNames.begin(), mia::kJointNames.end())) {
-    return make_error(Errc::kInvalidArgument,
-                      "[hand] driver \"mia\" moves the motors %s, %s and %s; the hand file of \"%.40s\" has others",
-                      mia::kJointNames[0], mia::kJointNames[1], mia::kJointNames[2], hand.name.c_str());
-  }
-  if (hand.side != config.subject.side) {
-    const auto name = [](Side side) { return kSideNames[static_cast<std::size_t>(side)]; };
-    return make_error(Errc::kInvalidArgument,
-                      "[subject] side is %s, but [hand] side is %s: a hand follows its own kind",
-                      name(config.subject.side), name(hand.side));
-  }
-  return {};
-}
 
 safety::ModeConfig mode_config(const config::SafetyConfig& config) {
   safety::ModeConfig modes;
@@ -90,13 +56,10 @@ Link make_link(const char* name, Baton<Driver, Info>& baton, std::function<Statu
 }  // namespace
 
 Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& config) {
-  for (const auto& [key, name, known] :
-       {std::tuple{"arm", &config.arm.driver, "ur_rtde"}, {"hand", &config.hand.driver, "mia"}}) {
-    if (*name == known) continue;
-    return make_error(Errc::kInvalidArgument, "[%s] driver = \"%s\" is unknown; this version has \"%s\"", key,
-                      name->c_str(), known);
+  if (const Status fits = check_devices(config); !fits) return fits.error();
+  if (config.hand.driver == config::HandDriverKind::kMia && config.hand.mia.wire != config::MiaWire::kSerial) {
+    spdlog::warn("hand: {}", mia::kCanProfileNotice);
   }
-  if (const Status fits = check_hand(config); !fits) return fits.error();
   Result<Models> models = make_models(config);
   if (!models) return models.error();
   embody::DdsConfig dds;
@@ -108,7 +71,7 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const config::EmbodyConfig& confi
   Result<DdsPublisher> publisher = DdsPublisher::create(dds);
   if (!publisher) return publisher.error();
   return std::unique_ptr<Daemon>(new Daemon(config, *models, make_tracker(config), make_arm(config.arm),
-                                            make_hand(config.hand), std::move(*publisher)));
+                                            make_hand(config), std::move(*publisher)));
 }
 
 Daemon::Daemon(const config::EmbodyConfig& config, const Models& models, std::unique_ptr<HandTracker> tracker,
@@ -138,7 +101,8 @@ Daemon::~Daemon() {
 std::vector<Link> Daemon::make_links() {
   std::vector<Link> links;
   links.push_back(make_link("tracker", tracker_baton_, [this] { return tracker_->service(); }));
-  links.push_back(make_link("arm", arm_baton_, {}));
+  links.push_back(make_link("arm", arm_baton_, [this] { return arm_->service(); }));
+  links.back().service_ends_session = false;  // the robot waits for its operator: that is for people to see
   links.push_back(make_link("hand", hand_baton_, {}));
   return links;
 }
@@ -155,6 +119,13 @@ ThreadOptions Daemon::finger_options() const {
   }
   spdlog::warn("record_mapping.solver = \"slsqp\" allocates memory: the finger thread runs with normal scheduling");
   return {"fingers", 0, realtime.cpus.fingers, false};
+}
+
+/// DDS takes locks and memory when it sends: the hand's thread then has normal scheduling.
+ThreadOptions Daemon::hand_options() const {
+  const config::RealtimeConfig& realtime = config_.realtime;
+  if (config_.hand.driver == config::HandDriverKind::kJointState) return {"hand", 0, realtime.cpus.hand, false};
+  return options("hand", realtime.priority.hand, realtime.cpus.hand);
 }
 
 Status Daemon::start() {
@@ -183,7 +154,7 @@ Status Daemon::start() {
   const config::CpuConfig& cpus = realtime.cpus;
   // Consumers before producers; links last, for it connects the devices.
   if (Status s = arm_thread_.start(options("arm", p.arm, cpus.arm), [this] { arm_loop_.run(); }); !s) return s;
-  if (Status s = hand_thread_.start(options("hand", p.hand, cpus.hand), [this] { hand_loop_.run(); }); !s) return s;
+  if (Status s = hand_thread_.start(hand_options(), [this] { hand_loop_.run(); }); !s) return s;
   if (Status s = finger_thread_.start(finger_options(), [this] { finger_loop_.run(); }); !s) return s;
   if (Status s = tracker_thread_.start(options("tracker", p.tracker, cpus.tracker), [this] { tracker_loop_.run(); });
       !s)

@@ -68,6 +68,7 @@ class Daemon {
   [[nodiscard]] std::function<void()> guarded(const char* name, std::function<void()> body);
   [[nodiscard]] ThreadOptions options(const char* name, int priority, const std::vector<int>& cpus) const;
   [[nodiscard]] ThreadOptions finger_options() const;
+  [[nodiscard]] ThreadOptions hand_options() const;
 
   config::EmbodyConfig config_;
   Edges edges_;

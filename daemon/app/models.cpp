@@ -17,6 +17,11 @@ Eigen::Vector3d vector3(const std::array<double, 3>& values) {
 
 hand::PoseEstimator make_hand_pose(const config::EmbodyConfig& config, const OperatorModels& models) {
   if (config.tracker.driver == config::TrackerDriver::kLandmarks) return hand::PalmPoseEstimator(models.hand_model());
+  if (!config.tracker.rigid_body.empty()) {
+    hand::BodyPoseConfig body;
+    body.X_BodyH = math::pose_from(vector3(config.tracker.p_BodyH_m), vector3(config.tracker.r_BodyH_rad));
+    return hand::HandPoseEstimator(body, models.X_HM);
+  }
   return hand::HandPoseEstimator(models.layout, models.X_HM);
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/app/config_io.hpp"
-#include "daemon/app/trackers.hpp"
+#include "daemon/app/devices.hpp"
 #include "daemon/control/exit_code.hpp"
 #include "daemon/ctl/answer.hpp"
 #include "daemon/ctl/collect_frames.hpp"

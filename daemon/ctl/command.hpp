@@ -28,6 +28,10 @@ void add_evaluate_command(CLI::App& app, int& exit_code);
 void add_evaluate_hands_commands(CLI::App& evaluate, int& exit_code);
 /// convert: recordings to trajectories of a robot hand.
 void add_convert_command(CLI::App& app, int& exit_code);
+/// discover: QTM computers on the network.
+void add_discover_command(CLI::App& app, int& exit_code);
+/// arm: power, brakes and stops of the robot arm.
+void add_arm_command(CLI::App& app, int& exit_code);
 /// onboard: a hand file for any URDF.
 void add_onboard_command(CLI::App& app, int& exit_code);
 

@@ -96,12 +96,15 @@ class Demo {
   }
 
   /// Settings for both programs. Ports are those that the lab took.
-  void write_config(int qtm_port, int ur_port) {
+  void write_config(const json& ready) {
     std::ofstream file(folder_.file("demo.toml"));
-    file << "schema = 1\n[tracker]\nport = " << qtm_port << "\n[arm]\nport = " << ur_port
-         << "\n[arm.limits]\nspeed_m_s = 0.6\nspeed_rad_s = 2.5\n[hand]\ndevice = \"" << folder_.file("mia")
-         << "\"\n[safety]\nhold_after_ms = 100\n[control]\nsocket = \"" << folder_.file("control.sock")
-         << "\"\n[dds]\ndomain = " << 1 + ::getpid() % 100 << "\n";
+    file << "schema = 1\n[tracker]\nport = " << ready.value("qtm_port", 1)
+         << "\n[arm]\nport = " << ready.value("ur_port", 1)
+         << "\ndashboard_port = " << ready.value("ur_dashboard_port", 1)
+         << "\nstale_after_ms = 500\n[arm.program]\nport = " << ready.value("ur_primary_port", 1)
+         << "\nwatchdog_hz = 2.0\n[arm.limits]\nspeed_m_s = 0.6\nspeed_rad_s = 2.5\n[hand]\ndevice = \""
+         << folder_.file("mia") << "\"\n[safety]\nhold_after_ms = 100\n[control]\nsocket = \""
+         << folder_.file("control.sock") << "\"\n[dds]\ndomain = " << 1 + ::getpid() % 100 << "\n";
   }
 
   int start_lab() {
@@ -111,7 +114,7 @@ class Demo {
         if (recording.empty() && fs::exists(data / "recordings/demo.tsv")) recording = data / "recordings/demo.tsv";
       }
     }
-    write_config(1, 1);
+    write_config(json::object());
     std::vector<std::string> arguments{"run",        recording,          "--config", folder_.file("demo.toml"),
                                        "--mia-link", folder_.file("mia")};
     if (options_.duration_s > 0.0) {
@@ -127,7 +130,7 @@ class Demo {
         const json event = json::parse(*line, nullptr, false);
         if (event.value("event", "") != "ready") continue;
         progress_.duration_s = event.value("frames", 0.0) / event.value("rate_hz", 100.0);
-        write_config(event.value("qtm_port", 0), event.value("ur_port", 0));
+        write_config(event);
         std::cout << "Simulated lab: QTM on port " << event.value("qtm_port", 0) << ", UR10e controller on port "
                   << event.value("ur_port", 0) << ", Mia hand on " << event.value("mia_device", "") << "; playing "
                   << recording << "\n"

@@ -37,14 +37,16 @@ void LinksLoop::step(Entry& entry) {
   if (ours) return connect(entry);
   entry.t_next = now() + std::chrono::seconds(1);
   if (!entry.link.service) return;
-  if (const Status status = entry.link.service(); !status) {
-    spdlog::warn("{}: {}", entry.link.name, status.error().detail.view());
-    {
-      const std::lock_guard lock(mutex_);
-      entry.report.detail = status.error().detail.view();
-    }
-    entry.link.revoke();
+  const Status status = entry.link.service();
+  const std::string detail(status ? std::string_view{} : status.error().detail.view());
+  const bool news = detail != entry.report.detail;  // only this thread writes it
+  if (news && !status) spdlog::warn("{}: {}", entry.link.name, detail);
+  if (news && status) spdlog::info("{}: in order again", entry.link.name);
+  if (news) {
+    const std::lock_guard lock(mutex_);
+    entry.report.detail = detail;
   }
+  if (!status && entry.link.service_ends_session) entry.link.revoke();
 }
 
 void LinksLoop::connect(Entry& entry) {

@@ -15,6 +15,7 @@ struct Link {
   std::function<bool()> with_links;              ///< no session: ours to connect
   std::function<Result<std::string>()> connect;  ///< connects and passes the driver to its loop; returns the peer
   std::function<Status()> service;               ///< about once a second while connected; may be empty
+  bool service_ends_session{true};               ///< when it fails; otherwise that is only said
   std::function<void()> revoke;                  ///< asks the loop to give the driver back
   std::function<std::string()> reason;           ///< why the last session ended
 };

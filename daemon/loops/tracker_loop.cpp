@@ -43,6 +43,8 @@ void TrackerLoop::drain() noexcept {
 
 void TrackerLoop::use() noexcept {
   const TimePoint t_decoded = now();
+  if (label_epoch_ && *label_epoch_ != tracked_.frame.label_epoch) monitor_.restart();
+  label_epoch_ = tracked_.frame.label_epoch;
   tracked_.pose = estimator_.step(tracked_.frame);
   if (const hand::TriadCheck* triad = estimator_.triad(); triad != nullptr) {
     tracked_.back = {true, triad->ambiguous(), triad->state(), triad->source(), triad->reference_m()};

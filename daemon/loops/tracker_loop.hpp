@@ -22,6 +22,7 @@ class TrackerLoop {
   TrackerBaton& baton_;
   hand::PoseEstimator estimator_;
   teleop::PoseMonitor monitor_;
+  std::optional<std::uint32_t> label_epoch_;  ///< of the last frame
   teleop::PosePredictor predictor_;
   Edges& edges_;
   TrackedFrame tracked_;  // as measured: fingers and observers

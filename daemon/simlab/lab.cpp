@@ -1,9 +1,9 @@
 #include "daemon/simlab/lab.hpp"
 
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "core/robot/ur_kinematics.hpp"
+#include "daemon/app/devices.hpp"
 #include "drivers/recording/tsv_recording.hpp"
 
 namespace embody::sim {
@@ -30,14 +30,16 @@ Result<Vector6> start_joints(const Models& models, const recording::Recording& r
   return make_error(Errc::kInvalidArgument, "the three markers on the back of the hand are never visible together");
 }
 
-UrControllerConfig ur_config(const Models& models, const recording::Recording& recording, const LabConfig& lab,
+UrControllerConfig ur_config(const config::ArmConfig& arm, const recording::Recording& recording, const LabConfig& lab,
                              const Vector6& q_start_rad) {
   UrControllerConfig config;
   config.address = lab.address;
   config.port = lab.ur_port;
   config.robot.q_start_rad = q_start_rad;
-  config.robot.program.max_velocity_rad_s = models.arm.joints.speed_rad_s;
-  config.robot.program.max_acceleration_rad_s2 = models.arm.joints.acceleration_rad_s2;
+  config.primary_port = lab.ur_primary_port;
+  config.dashboard_port = lab.ur_dashboard_port;
+  config.model = robot::model_of(arm.model).name;
+  config.robot.program = control_script_config(arm);
   const double seconds = static_cast<double>(recording.frames.size()) / recording.rate_hz + 120.0;
   config.log_capacity = static_cast<std::size_t>(seconds * config.frequency_hz);
   return config;
@@ -57,11 +59,6 @@ QtmServerConfig qtm_config(const LabConfig& lab) {
   config.port = lab.qtm_port;
   return config;
 }
-
-bool on(const std::string& word) {
-  return word == "on";
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Lab>> Lab::create(const config::EmbodyConfig& config, const LabConfig& lab) {
@@ -79,14 +76,15 @@ Result<std::unique_ptr<Lab>> Lab::create(const config::EmbodyConfig& config, con
   const Result<Vector6> q_start = start_joints(*models, *recording, lab.start_offset_m);
   if (!q_start)
     return make_error(q_start.error().code, "%s: %s", lab.recording.c_str(), q_start.error().detail.c_str());
-  return std::unique_ptr<Lab>(new Lab(std::move(*models), std::move(*recording), lab, *q_start));
+  return std::unique_ptr<Lab>(new Lab(config.arm, std::move(*models), std::move(*recording), lab, *q_start));
 }
 
-Lab::Lab(Models models, recording::Recording recording, const LabConfig& lab, const Vector6& q_start_rad)
+Lab::Lab(const config::ArmConfig& arm, Models models, recording::Recording recording, const LabConfig& lab,
+         const Vector6& q_start_rad)
     : models_(std::move(models)),
       recording_(std::move(recording)),
       qtm_(qtm_config(lab), recording_),
-      ur_(ur_config(models_, recording_, lab, q_start_rad)),
+      ur_(ur_config(arm, recording_, lab, q_start_rad)),
       mia_(mia_config(recording_, lab)) {}
 
 Status Lab::start() {
@@ -104,29 +102,14 @@ void Lab::play() {
 }
 
 Status Lab::fault(const std::string& command) {
-  std::istringstream words(command);
-  std::string device;
-  std::string what;
-  std::string argument;
-  std::string second;
-  words >> device >> what >> argument >> second;
-  const std::string key = device + " " + what;
-  if (key == "qtm disconnect") return qtm_.disconnect_clients(), Status{};
-  if (key == "qtm pause") return qtm_.pause(std::chrono::milliseconds(std::atoi(argument.c_str()))), Status{};
-  if (key == "qtm hide" && qtm_.set_marker_hidden(argument, true)) return {};
-  if (key == "qtm show" && qtm_.set_marker_hidden(argument, false)) return {};
-  if (key == "qtm swap" && qtm_.swap_labels(argument, second)) return {};
-  if (key == "qtm ghost" && (on(second) || second == "off") && qtm_.set_ghost(argument, on(second))) return {};
-  if (key == "ur protective_stop") return ur_.protective_stop(), Status{};
-  if (key == "ur emergency_stop") return ur_.emergency_stop(), Status{};
-  if (key == "ur clear_stop") return ur_.clear_stop(), Status{};
-  if (key == "ur disconnect") return ur_.disconnect_clients(), Status{};
-  if (key == "ur freeze") return ur_.freeze(on(argument)), Status{};
-  if (key == "ur program") return ur_.set_program_running(on(argument)), Status{};
-  if (key == "mia unplug") return mia_.unplug(), Status{};
-  if (key == "mia plug") return mia_.start();
-  if (key == "mia mute") return mia_.mute(on(argument)), Status{};
-  return make_error(Errc::kInvalidArgument, "unknown fault '%s'", command.c_str());
+  const std::size_t end = std::min(command.find(' '), command.size());
+  const std::string_view device = std::string_view(command).substr(0, end);
+  const std::string_view fault = std::string_view(command).substr(std::min(end + 1, command.size()));
+  if (device == "qtm") return qtm_.fault(fault);
+  if (device == "ur") return ur_.fault(fault);
+  if (device == "mia") return mia_.fault(fault);
+  return make_error(Errc::kInvalidArgument, "a fault begins with the device, qtm, ur or mia, not '%.40s'",
+                    command.c_str());
 }
 
 std::string Lab::report_json() const {

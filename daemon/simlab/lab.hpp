@@ -16,6 +16,8 @@ struct LabConfig {
   std::string address{"127.0.0.1"};
   std::uint16_t qtm_port{0};  ///< 0: a free one
   std::uint16_t ur_port{0};
+  std::uint16_t ur_primary_port{0};
+  std::uint16_t ur_dashboard_port{0};
   std::string mia_link;                               ///< path of a symlink to the hand's pseudo-terminal; empty: none
   Eigen::Vector3d start_offset_m{-0.05, 0.03, 0.08};  ///< flange at the start, off the recording's first target (B)
 };
@@ -33,7 +35,7 @@ class Lab {
   [[nodiscard]] bool finished() const { return qtm_.finished(); }
 
   [[nodiscard]] std::uint16_t qtm_port() const { return qtm_.port(); }
-  [[nodiscard]] std::uint16_t ur_port() const { return ur_.port(); }
+  [[nodiscard]] const UrController& ur() const { return ur_; }
   [[nodiscard]] std::string mia_device() const { return mia_.device(); }
   [[nodiscard]] std::size_t frame_count() const noexcept { return recording_.frames.size(); }
   [[nodiscard]] double rate_hz() const noexcept { return recording_.rate_hz; }
@@ -48,7 +50,8 @@ class Lab {
   [[nodiscard]] std::string report_json() const;
 
  private:
-  Lab(Models models, recording::Recording recording, const LabConfig& lab, const Vector6& q_start_rad);
+  Lab(const config::ArmConfig& arm, Models models, recording::Recording recording, const LabConfig& lab,
+      const Vector6& q_start_rad);
 
   Models models_;
   recording::Recording recording_;

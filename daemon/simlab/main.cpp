@@ -79,7 +79,9 @@ void obey(sim::Lab& lab, const std::string& line, bool& quit) {
 int run(sim::Lab& lab, StopSignals& signals, bool wait_for_play) {
   say({{"event", "ready"},
        {"qtm_port", lab.qtm_port()},
-       {"ur_port", lab.ur_port()},
+       {"ur_port", lab.ur().port()},
+       {"ur_primary_port", lab.ur().primary_port()},
+       {"ur_dashboard_port", lab.ur().dashboard_port()},
        {"mia_device", lab.mia_device()},
        {"frames", lab.frame_count()},
        {"rate_hz", lab.rate_hz()}});
@@ -194,6 +196,8 @@ int run_program(int argc, char** argv) {
   run_command->add_option("--address", lab.address, "IPv4 address to listen on")->capture_default_str();
   run_command->add_option("--qtm-port", lab.qtm_port, "TCP port of the QTM server; 0 takes a free one");
   run_command->add_option("--ur-port", lab.ur_port, "TCP port of the UR controller; 0 takes a free one");
+  run_command->add_option("--ur-primary-port", lab.ur_primary_port, "TCP port in place of the controller's 30001");
+  run_command->add_option("--ur-dashboard-port", lab.ur_dashboard_port, "TCP port in place of the controller's 29999");
   run_command->add_option("--mia-link", lab.mia_link, "Create a symlink to the hand's pseudo-terminal here");
   run_command->add_flag("--wait", wait_for_play, "Play only after the line 'play' on standard input");
 

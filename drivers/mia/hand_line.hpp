@@ -23,6 +23,8 @@ class HandLine {
   virtual IoStatus send(const Command& command) noexcept = 0;
   /// The next complete line with its LF, valid until the next call. Neither waits nor allocates.
   virtual IoStatus receive(std::string_view& line) noexcept = 0;
+  /// Why the connection ended, where the wire knows more than that it is gone.
+  [[nodiscard]] virtual std::string_view reason() const noexcept { return {}; }
 };
 
 /// Opens a new connection. May block and allocate. Errors are sentences for the operator.

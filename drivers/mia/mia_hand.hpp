@@ -1,46 +1,35 @@
 #pragma once
 // A Prensilia Mia hand on a serial line, or on another wire that carries its protocol.
-#include <string>
+#include <atomic>
 
 #include "core/hal/hand_driver.hpp"
-#include "drivers/mia/codec.hpp"
+#include "drivers/mia/exchange.hpp"
 #include "drivers/mia/hand_line.hpp"
-#include "drivers/mia/transmission.hpp"
+#include "drivers/mia/mia_config.hpp"
+#include "drivers/mia/motion_queue.hpp"
+#include "drivers/mia/motion_watch.hpp"
+#include "drivers/mia/stop_sequence.hpp"
 
 namespace embody::mia {
 
-struct MiaConfig {
-  std::string device{"/dev/ttyUSB0"};
-  Duration ack_timeout{std::chrono::milliseconds(20)};  ///< for the ACK, and again for the data after it
-  int speed_percent{60};                                ///< 0..99; 100 % of the range is 90 units of the vendor
-  int lost_after_timeouts{5};                           ///< consecutive ones that end the session
-  std::array<double, kMotors> min_rad{0.0, -1.4, 0.0};  ///< motor limits; targets are clamped to them
-  std::array<double, kMotors> max_rad{1.1345, 1.4, 1.396};
-  Transmission transmission;
-};
-
-/// What happened on the line since the object was made. To be read by the thread that calls read() and write().
-struct MiaCounters {
-  std::uint64_t commands{0};    ///< frames sent
-  std::uint64_t acks{0};        ///< good ACKs
-  std::uint64_t timeouts{0};    ///< ACK or data that did not come in time
-  std::uint64_t mismatches{0};  ///< lines that were not what was waited for
-  std::uint64_t replies{0};     ///< position replies
-  std::uint64_t expired{0};     ///< queued motions dropped because their time had passed
-  std::uint64_t stops{0};       ///< stop exchanges started
-};
-
-/// Half duplex: one command is under way at a time; the next leaves when the ACK (and data) has come or timed out.
-/// write() queues a cycle - the motors whose count changed, each at least once a second, then a position request - and
-/// replaces what an older cycle has not sent yet. read() takes bytes, sends what is next and watches the time-outs:
-/// call it when the descriptor is readable and at least every 20 ms.
+/// Motors are moved by position commands only: the hand has no watchdog, and a position command ends by itself.
 ///
-/// kMove is refused when expired, not finite, of a wrong joint count, or while stopped. kHold and kStop are never
-/// refused: they only make the hand quieter, and both drop motion that has not been sent. (The hand itself finishes the
-/// last position command it acknowledged.)
-/// kStop latches before anything is sent; then the stop command (up to four times until acknowledged) and, for firmware
-/// that does not know it, zero speed to each motor. The latch opens on connect(), or on a kMove after a kHold once the
-/// stop exchange is over. A kStop that was never acknowledged starts again with the next kStop.
+/// Acknowledging firmware: half duplex, one command is under way at a time (exchange.hpp). A lost one is sent once
+/// more. write() queues a cycle - the motors whose target changed, each at least once a second, then a position request
+/// - and replaces what an older cycle has not sent yet. Streaming firmware: commands leave one after the other, as the
+/// wire takes them, each motor at least four times a second because nobody tells what arrived; positions come by
+/// themselves. read() takes bytes, sends what is next and watches the time: call it when the descriptor is readable and
+/// at least every 20 ms.
+///
+/// kMove is refused when expired, not finite, of a wrong joint count, while stopped, while the calibration is in doubt,
+/// and while a streaming hand tells no positions. kHold and kStop are never refused: they only make the hand quieter,
+/// and both drop motion that has not been sent. (The hand itself finishes the last position command it heard.) kStop
+/// latches before anything is sent (stop_sequence.hpp); positions are then asked for until the hand stands still, and
+/// if it does not within half a second it is stopped again. The latch opens on connect(), or on a kMove after a kHold
+/// once the stop is over and the positions were read again.
+///
+/// When the hand was found to have restarted (motion_watch.hpp; its supply may have dropped), the session ends and the
+/// calibration is in doubt: connect() succeeds, positions are read, but nothing moves until confirm_calibration().
 class MiaHand final : public HandDriver {
  public:
   /// On the serial line `config.device`.
@@ -53,79 +42,79 @@ class MiaHand final : public HandDriver {
   IoStatus read(HandDeviceState& state) noexcept override;
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override;
 
+  /// Makes a connected hand calibrate its motor positions: **it moves**. Blocks until the positions have been still for
+  /// a second, at most 30 s; the hand itself shows the end by its green light only. Call it in place of read() and
+  /// write(), never while they run. Leaves the confirmation to the operator. Acknowledging firmware only.
+  /// Errors: kDisconnected, kRefused (stopped), kUnsupported, kTimeout.
+  Status calibrate();
+  /// The operator has seen that the counters are right. From any thread.
+  void confirm_calibration() noexcept { calibration_in_doubt_.store(false, std::memory_order_relaxed); }
+  [[nodiscard]] bool calibration_in_doubt() const noexcept {
+    return calibration_in_doubt_.load(std::memory_order_relaxed);
+  }
+
+  // The rest is for the thread that calls read() and write().
   [[nodiscard]] const MiaCounters& counters() const noexcept { return counters_; }
-  [[nodiscard]] bool stopped() const noexcept { return stop_.latched; }
+  [[nodiscard]] const MiaTelemetry& telemetry() const noexcept { return telemetry_.data(); }
+  /// Takes the mean of the next readings for zero force.
+  void tare() noexcept { telemetry_.tare(); }
+  [[nodiscard]] Generation generation() const noexcept { return generation_; }
+  [[nodiscard]] bool stopped() const noexcept { return stop_.latched(); }
+  /// No motor has moved for 150 ms up to the last position reply.
+  [[nodiscard]] bool standing_still() const noexcept { return watch_.still(); }
   /// Passive joint j_thumb_opp at the last position reply (rad).
   [[nodiscard]] double thumb_opposition() const noexcept;
 
  private:
-  enum class Waiting : std::uint8_t { kNothing, kAck, kData };
-  enum class Sent : std::uint8_t { kMotor, kRead, kStopAll, kZeroSpeed };
-  enum class StopPhase : std::uint8_t { kOver, kStopAll, kZeroSpeed };
-
-  /// The one command under way.
-  struct Bus {
-    Waiting waiting{Waiting::kNothing};
-    Command command{};
-    Sent sent{Sent::kRead};
-    std::size_t motor{0};
-    int counts{0};
-    TimePoint t_sent{};
-    TimePoint deadline{};
-    int timeouts_in_a_row{0};
-  };
-  /// What waits for its turn.
-  struct Motion {
-    bool pending{false};
-    int counts{0};
-    TimePoint t_expires{};
-  };
-  struct Cycle {
-    std::array<Motion, kMotors> motion{};
-    bool read_pending{false};
-    std::size_t next_slot{0};  ///< motors, then the position request: each in turn, so that none starves
-  };
-  /// The last position command that a motor acknowledged.
-  struct Told {
-    bool known{false};
-    int counts{0};
-    TimePoint when{};
-  };
-  struct StopState {
-    bool latched{false};
-    bool hold_seen{false};
-    bool acknowledged{false};
-    StopPhase phase{StopPhase::kOver};
-    int tries{0};
-    std::size_t motor{0};
-    std::size_t zero_speed_acks{0};
-  };
   struct Reply {
     bool ready{false};
-    std::array<double, kMotors> counts{};
+    std::array<double, kMotors> q_rad{};
     TimePoint t_arrival{};
     std::uint64_t number{0};
-    int missed_in_a_row{0};
+  };
+  /// Of a streaming hand.
+  struct Stream {
+    TimePoint t_line{};                  ///< last line that could be read
+    TimePoint t_position{};              ///< last position
+    TimePoint t_asked{};                 ///< last sign of life that was asked for
+    TimePoint t_answered{};              ///< first answer to that since the positions ended
+    TimePoint t_wire_free{};             ///< when the wire has carried what was sent
+    std::array<TimePoint, 2> t_armed{};  ///< currents and forces switched on
   };
 
-  // Session
-  Result<HandInfo> probe();
+  // Session (session.cpp)
+  Result<HandInfo> start_session();
+  [[nodiscard]] HandInfo describe(std::string_view firmware) const;
   void end_session() noexcept;
+  void lose(std::string_view reason) noexcept;
   void hang_up() noexcept;
+  void hand_restarted() noexcept;
+  void doubt_calibration() noexcept;
 
-  // Bus
+  // Both generations
   void pump() noexcept;
-  void take_line(std::string_view line, TimePoint now) noexcept;
-  void take_ack(TimePoint now) noexcept;
-  void take_timeout() noexcept;
-  void send_next(TimePoint now) noexcept;
-  bool send_slot(std::size_t slot, TimePoint now) noexcept;
-  void transmit(const Command& command, Sent what, TimePoint now) noexcept;
-
-  // Stop
+  void turn(TimePoint now) noexcept;
+  void take_positions(const std::array<double, kMotors>& counts, const std::array<double, kMotors>& q_rad,
+                      TimePoint now) noexcept;
+  [[nodiscard]] std::optional<Outgoing> next_motion(std::size_t motor, TimePoint now) noexcept;
+  void transmit(const Outgoing& outgoing, TimePoint now) noexcept;
   void request_stop() noexcept;
-  void send_stop_step(TimePoint now) noexcept;
-  void finish_stop_step(bool acknowledged) noexcept;
+  void finish_stop_step(bool acknowledged, TimePoint now) noexcept;
+  void watch_stop(TimePoint now) noexcept;
+
+  // Acknowledging firmware (acknowledging.cpp)
+  void take_answer(std::string_view line, TimePoint now) noexcept;
+  void take_ack(TimePoint now) noexcept;
+  void take_data(std::string_view line, TimePoint now) noexcept;
+  void take_timeout(TimePoint now) noexcept;
+  void give_up() noexcept;
+  void send_next(TimePoint now) noexcept;
+
+  // Streaming firmware (streaming.cpp)
+  void take_streamed(std::string_view line, TimePoint now) noexcept;
+  void supervise_stream(TimePoint now) noexcept;
+  void turn_streaming(TimePoint now) noexcept;
+  bool send_streaming(TimePoint now) noexcept;
 
   // Commands
   [[nodiscard]] bool may_move(const HandCommand& command, TimePoint now) const noexcept;
@@ -136,13 +125,26 @@ class MiaHand final : public HandDriver {
   OpenLine open_;
   std::unique_ptr<HandLine> line_;  ///< empty: no session
   MiaCounters counters_;
-  bool lost_{true};     ///< the session is over
-  bool hung_up_{true};  ///< and the line with it
-  Bus bus_;
-  Cycle cycle_;
-  std::array<Told, kMotors> told_{};
-  StopState stop_;
+  Generation generation_{Generation::kAcknowledging};
+  bool lost_{true};        ///< the session is over
+  bool hung_up_{true};     ///< and the line with it
+  bool restarted_{false};  ///< why it is over
+  std::atomic<bool> calibration_in_doubt_{false};
+
+  MotionQueue queue_;
+  MotionWatch watch_;
+  StopSequence stop_;
+  TelemetryReader telemetry_;
   Reply reply_;
+  Exchange exchange_;
+  Stream stream_;
+  bool read_pending_{false};
+  std::size_t next_slot_{0};  ///< motors, then the position request: each in turn, so that none starves
+  int timeouts_in_a_row_{0};
+  int missed_replies_{0};
+  TimePoint t_written_{};
+  TimePoint t_asked_{};      ///< last position request
+  TimePoint t_stop_over_{};  ///< the last stop sequence had been sent
 };
 
 }  // namespace embody::mia

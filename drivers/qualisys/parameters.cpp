@@ -40,28 +40,67 @@ Status parse_frequency(const tinyxml2::XMLElement& general, double& frequency_hz
                     static_cast<int>(std::min<std::size_t>(text.size(), 40)), text.data());
 }
 
+RealTimeProcessing parse_processing(const tinyxml2::XMLElement& general) noexcept {
+  const auto* actions = general.FirstChildElement("RealTime_Processing_Actions");
+  if (actions == nullptr) return {};
+  const auto tracking = child_text(*actions, "Tracking");
+  return {tracking.empty() || tracking == "3D", child_text(*actions, "AIM") != "false",
+          child_text(*actions, "Track6DOF") != "false"};
+}
+
+/// The name of `element`, number `index` (from 1) of QTM's list of `kind`.
+Result<std::string> parse_name(const tinyxml2::XMLElement& element, const char* kind, std::size_t index,
+                               std::size_t most) {
+  const auto name = child_text(element, "Name");
+  if (index > most) return make_error(Errc::kUnsupported, "QTM lists more than %zu %ss", most, kind);
+  if (name.empty() || name.size() > kMaxNameLength) {
+    return make_error(Errc::kMalformed, "%s %zu of QTM has a name of %zu characters (allowed: 1 to %zu)", kind, index,
+                      name.size(), kMaxNameLength);
+  }
+  return std::string(name);
+}
+
+Error same_name(const char* kind, const std::string& name) noexcept {
+  return make_error(Errc::kRefused, "QTM lists two %s called '%s'; rename one of them in QTM", kind, name.c_str());
+}
+
+/// The number that QTM announces in the element `name` must be `found`.
+Status check_count(const tinyxml2::XMLElement& section, const char* name, const char* kind, std::size_t found) {
+  std::size_t announced = 0;
+  const auto text = child_text(section, name);
+  if (parse_number(text, announced) && announced == found) return {};
+  return make_error(Errc::kMalformed, "QTM announces '%.*s' %s and lists %zu",
+                    static_cast<int>(std::min<std::size_t>(text.size(), 40)), text.data(), kind, found);
+}
+
 Status parse_labels(const tinyxml2::XMLElement& section, std::vector<std::string>& labels) {
   for (const auto* label = section.FirstChildElement("Label"); label != nullptr;
        label = label->NextSiblingElement("Label")) {
-    const auto name = child_text(*label, "Name");
-    if (labels.size() == kMaxDataMarkers) {
-      return make_error(Errc::kUnsupported, "QTM lists more than %zu labelled markers", kMaxDataMarkers);
-    }
-    if (name.empty() || name.size() > kMaxNameLength) {
-      return make_error(Errc::kMalformed, "label %zu of QTM has a name of %zu characters (allowed: 1 to %zu)",
-                        labels.size() + 1, name.size(), kMaxNameLength);
-    }
-    if (std::find(labels.begin(), labels.end(), name) != labels.end()) {
-      return make_error(Errc::kRefused, "QTM lists two markers called '%.*s'; rename one of them in QTM",
-                        static_cast<int>(name.size()), name.data());
-    }
-    labels.emplace_back(name);
+    auto name = parse_name(*label, "label", labels.size() + 1, kMaxDataMarkers);
+    if (!name) return name.error();
+    if (std::find(labels.begin(), labels.end(), *name) != labels.end()) return same_name("markers", *name);
+    labels.push_back(std::move(*name));
   }
-  std::size_t announced = 0;
-  if (parse_number(child_text(section, "Labels"), announced) && announced == labels.size()) return {};
-  const auto text = child_text(section, "Labels");
-  return make_error(Errc::kMalformed, "QTM announces '%.*s' labels and lists %zu",
-                    static_cast<int>(std::min<std::size_t>(text.size(), 40)), text.data(), labels.size());
+  return check_count(section, "Labels", "labels", labels.size());
+}
+
+/// QTM tells poses relative to the world (0) or to another body; the text of these elements says which.
+bool is_relative(const tinyxml2::XMLElement& body, const char* name) noexcept {
+  const auto text = child_text(body, name);
+  return !text.empty() && text != "0";
+}
+
+Status parse_bodies(const tinyxml2::XMLElement& section, std::vector<BodyParameters>& bodies) {
+  for (const auto* body = section.FirstChildElement("Body"); body != nullptr; body = body->NextSiblingElement("Body")) {
+    auto name = parse_name(*body, "rigid body", bodies.size() + 1, kMaxDataBodies);
+    if (!name) return name.error();
+    const auto same = [&](const BodyParameters& other) { return other.name == *name; };
+    if (std::any_of(bodies.begin(), bodies.end(), same)) return same_name("rigid bodies", *name);
+    const bool relative = is_relative(*body, "Data_origin") || is_relative(*body, "Data_orientation");
+    bodies.push_back({std::move(*name), child_text(*body, "Enabled") != "false", relative});
+  }
+  if (section.FirstChildElement("Bodies") == nullptr) return {};  // since 1.21 nothing is announced
+  return check_count(section, "Bodies", "rigid bodies", bodies.size());
 }
 
 }  // namespace
@@ -78,6 +117,7 @@ Result<Parameters> parse_parameters(std::string_view xml) {
   Parameters parameters;
   if (const auto* general = root.FirstChildElement("General"); general != nullptr) {
     if (const auto status = parse_frequency(*general, parameters.frequency_hz); !status) return status.error();
+    parameters.processing = parse_processing(*general);
   }
   const auto* section = root.FirstChildElement("The_3D");
   if (section == nullptr) {
@@ -86,6 +126,9 @@ Result<Parameters> parse_parameters(std::string_view xml) {
   parameters.axis_upwards = child_text(*section, "AxisUpwards");
   parameters.calibration_time = child_text(*section, "CalibrationTime");
   if (const auto status = parse_labels(*section, parameters.labels); !status) return status.error();
+  if (const auto* bodies = root.FirstChildElement("The_6D"); bodies != nullptr) {
+    if (const auto status = parse_bodies(*bodies, parameters.bodies); !status) return status.error();
+  }
   return parameters;
 }
 

@@ -1,5 +1,9 @@
 #include "drivers/qualisys/rt_connection.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
 #include <algorithm>
 
 #include "drivers/transport/clock.hpp"
@@ -19,34 +23,57 @@ std::string printable(std::string_view text) {
   return shown;
 }
 
+/// Lets the kernel give up on a peer that no longer answers, whether we send or only listen.
+void watch_peer(int fd) noexcept {
+  const auto set = [fd](int level, int name, int value) { ::setsockopt(fd, level, name, &value, sizeof value); };
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+  set(IPPROTO_TCP, TCP_KEEPIDLE, 1);   // s
+  set(IPPROTO_TCP, TCP_KEEPINTVL, 1);  // s
+  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+  set(IPPROTO_TCP, TCP_USER_TIMEOUT, 3000);  // ms
+}
+
 }  // namespace
 
 Result<RtConnection> RtConnection::open(const std::string& host, std::uint16_t port, std::size_t buffer_size,
-                                        TimePoint deadline) {
+                                        TimePoint deadline, ByteOrder order, int newest_minor) {
   auto fd = transport::tcp_connect(host, port, deadline);
   if (!fd) {
     return make_error(fd.error().code, "cannot reach QTM: %s; start QTM and its real-time output",
                       fd.error().detail.c_str());
   }
-  RtConnection connection(std::move(*fd), buffer_size);
+  watch_peer(fd->get());
+  RtConnection connection(std::move(*fd), buffer_size, order);
   const auto welcome = connection.wait_text(PacketType::kCommand, deadline);
   if (!welcome) return welcome.error();
   if (!welcome->starts_with(kWelcome)) {
     return make_error(Errc::kMalformed, "%s:%u is not a QTM real-time server: it says '%s'", host.c_str(),
                       unsigned{port}, printable(*welcome).c_str());
   }
-  const std::string version(kProtocolVersion);
-  const auto reply = connection.ask("Version " + version, PacketType::kCommand, deadline);
-  if (!reply && reply.error().code != Errc::kRefused) return reply.error();
-  if (!reply || *reply != "Version set to " + version) {
-    return make_error(Errc::kUnsupported, "QTM at %s does not speak real-time protocol %s ('%s'); update QTM",
-                      host.c_str(), version.c_str(), reply ? printable(*reply).c_str() : reply.error().detail.c_str());
+  if (const auto status = connection.agree_on_version(host, newest_minor, deadline); !status) {
+    return status.error();
   }
   return connection;
 }
 
+Status RtConnection::agree_on_version(const std::string& host, int newest_minor, TimePoint deadline) {
+  std::string last_words;
+  for (int minor = newest_minor; minor >= kOldestMinorVersion; --minor) {
+    const std::string version = "1." + std::to_string(minor);
+    const auto reply = ask("Version " + version, PacketType::kCommand, deadline);
+    if (!reply && reply.error().code != Errc::kRefused) return reply.error();
+    if (reply && *reply == "Version set to " + version) {
+      minor_version_ = minor;
+      return {};
+    }
+    last_words = reply ? printable(*reply) : std::string(reply.error().detail.view());
+  }
+  return make_error(Errc::kUnsupported, "QTM at %.80s speaks no real-time protocol from 1.%d down to 1.%d ('%s')",
+                    host.c_str(), newest_minor, kOldestMinorVersion, last_words.c_str());
+}
+
 Status RtConnection::send(std::string_view command, TimePoint deadline) {
-  const auto packet = encode_text(PacketType::kCommand, command);
+  const auto packet = encode_text(PacketType::kCommand, command, order_);
   return transport::send_all(fd_.get(), packet, deadline);
 }
 
@@ -60,8 +87,8 @@ Result<Event> RtConnection::ask_state(TimePoint deadline) {
   while (true) {
     const auto packet = wait_packet(deadline);
     if (!packet) return packet.error();
-    if (decode_header(*packet)->type != PacketType::kEvent) continue;
-    const auto event = decode_event(*packet);
+    if (decode_header(*packet, order_)->type != PacketType::kEvent) continue;
+    const auto event = decode_event(*packet, order_);
     if (!event || is_state(*event)) return event;
   }
 }
@@ -70,9 +97,9 @@ Result<std::string> RtConnection::wait_text(PacketType reply, TimePoint deadline
   while (true) {
     const auto packet = wait_packet(deadline);
     if (!packet) return packet.error();
-    const auto type = decode_header(*packet)->type;
+    const auto type = decode_header(*packet, order_)->type;
     if (type != reply && type != PacketType::kError) continue;
-    const auto text = decode_text(*packet);
+    const auto text = decode_text(*packet, order_);
     if (!text) return text.error();
     if (type == PacketType::kError) return make_error(Errc::kRefused, "QTM says: %s", printable(*text).c_str());
     return std::string(*text);

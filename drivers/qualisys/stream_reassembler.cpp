@@ -23,7 +23,7 @@ void StreamReassembler::commit(std::size_t size) noexcept {
 Result<std::span<const std::byte>> StreamReassembler::next() noexcept {
   const auto waiting = std::span<const std::byte>(buffer_).subspan(begin_, end_ - begin_);
   if (waiting.size() < kHeaderSize) return std::span<const std::byte>{};
-  const auto header = decode_header(waiting);
+  const auto header = decode_header(waiting, order_);
   if (!header) return header.error();
   if (header->size > buffer_.size()) {
     return make_error(Errc::kUnsupported, "QTM sent a packet of %zu bytes, more than the %zu handled here",

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "drivers/qualisys/byte_order.hpp"
 
 namespace embody::qualisys {
 
@@ -12,7 +13,8 @@ namespace embody::qualisys {
 class StreamReassembler {
  public:
   /// Packets of up to `capacity` bytes pass.
-  explicit StreamReassembler(std::size_t capacity) : buffer_(capacity) {}
+  explicit StreamReassembler(std::size_t capacity, ByteOrder order = ByteOrder::kLittle)
+      : buffer_(capacity), order_(order) {}
 
   /// Where the next bytes belong; moves an unfinished packet to the front, so earlier packets become invalid. Not empty
   /// after next() returned an empty span.
@@ -25,6 +27,7 @@ class StreamReassembler {
 
  private:
   std::vector<std::byte> buffer_;
+  ByteOrder order_;
   std::size_t begin_{0};  // first byte not yet handed out
   std::size_t end_{0};    // behind the last byte received
 };

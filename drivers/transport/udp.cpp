@@ -2,10 +2,12 @@
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
+#include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 
@@ -86,6 +88,57 @@ Datagram receive_datagram(int fd, std::span<std::byte> buffer) noexcept {
   if (size >= 0) return {IoStatus::kDone, static_cast<std::size_t>(size), ntohl(from.sin_addr.s_addr)};
   if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return {};
   return {IoStatus::kDisconnected, 0, 0};
+}
+
+std::vector<std::string> interface_addresses() {
+  std::vector<std::string> addresses;
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return addresses;
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
+  for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET || (entry->ifa_flags & IFF_UP) == 0) {
+      continue;
+    }
+    addresses.push_back(dotted(ipv4(entry->ifa_addr)));
+  }
+  return addresses;
+}
+
+Result<std::string> broadcast_address(const std::string& address) {
+  const auto network = network_of(address);
+  if (!network) return network.error();
+  if (network->address == kLoopback.address && network->mask == kLoopback.mask) return address;
+  return dotted(network->address | ~network->mask);
+}
+
+Status send_datagram(int fd, const std::string& address, std::uint16_t port, std::span<const std::byte> datagram) {
+  const auto where = parse(address, port);
+  if (!where) return where.error();
+  const int on = 1;
+  ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &on, sizeof on);
+  const ssize_t size = ::sendto(fd, datagram.data(), datagram.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                                reinterpret_cast<const sockaddr*>(&*where), sizeof *where);
+  if (size == static_cast<ssize_t>(datagram.size())) return {};
+  return make_error(Errc::kIo, "cannot send to UDP %s:%u: %s", address.c_str(), unsigned{port}, std::strerror(errno));
+}
+
+std::uint32_t own_address(int fd) noexcept {
+  sockaddr_in where{};
+  socklen_t size = sizeof where;
+  return ::getsockname(fd, reinterpret_cast<sockaddr*>(&where), &size) == 0 ? ntohl(where.sin_addr.s_addr) : 0;
+}
+
+std::uint32_t peer_address(int fd) noexcept {
+  sockaddr_in where{};
+  socklen_t size = sizeof where;
+  return ::getpeername(fd, reinterpret_cast<sockaddr*>(&where), &size) == 0 ? ntohl(where.sin_addr.s_addr) : 0;
+}
+
+std::string dotted(std::uint32_t address) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%u.%u.%u.%u", address >> 24, (address >> 16) & 0xff, (address >> 8) & 0xff,
+                address & 0xff);
+  return text;
 }
 
 }  // namespace embody::transport

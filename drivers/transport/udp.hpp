@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/base/result.hpp"
 #include "core/hal/hand_tracker.hpp"
@@ -40,5 +41,24 @@ struct Datagram {
 
 /// One recvfrom() without waiting. A datagram may be empty: kDone with size 0.
 [[nodiscard]] Datagram receive_datagram(int fd, std::span<std::byte> buffer) noexcept;
+
+/// IPv4 addresses of this computer's interfaces that are up, loopback included.
+[[nodiscard]] std::vector<std::string> interface_addresses();
+
+/// Where a datagram reaches everybody on the network of the interface that owns `address`; for a loopback address that
+/// address itself. Errors: those of network_of().
+[[nodiscard]] Result<std::string> broadcast_address(const std::string& address);
+
+/// Sends one datagram from a bound socket to `address` (numeric IPv4, a broadcast address too) without waiting.
+/// Errors: kInvalidArgument, kIo.
+[[nodiscard]] Status send_datagram(int fd, const std::string& address, std::uint16_t port,
+                                   std::span<const std::byte> datagram);
+
+/// IPv4 address of this side or of the peer of a connected socket, host byte order; 0 on failure.
+[[nodiscard]] std::uint32_t own_address(int fd) noexcept;
+[[nodiscard]] std::uint32_t peer_address(int fd) noexcept;
+
+/// `address` (host byte order) as text: 192.0.2.1.
+[[nodiscard]] std::string dotted(std::uint32_t address);
 
 }  // namespace embody::transport

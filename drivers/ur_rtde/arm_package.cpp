@@ -1,6 +1,8 @@
 #include "drivers/ur_rtde/arm_package.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace embody::rtde {
 namespace {
@@ -67,6 +69,36 @@ std::int32_t mode_of(ArmAction action) noexcept {
 
 }  // namespace
 
+OutputRecipe::OutputRecipe() noexcept : count_(kOutputRecipe.size() + kOptionalOutputs.size()) {
+  std::copy(kOutputRecipe.begin(), kOutputRecipe.end(), variables_.begin());
+  std::copy(kOptionalOutputs.begin(), kOptionalOutputs.end(), variables_.begin() + kOutputRecipe.size());
+}
+
+bool OutputRecipe::drop_unknown(std::string_view reply_types) noexcept {
+  std::string_view token;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const bool unknown = next_token(reply_types, token) && token == "NOT_FOUND" && i >= kOutputRecipe.size();
+    if (!unknown) variables_[kept++] = variables_[i];
+  }
+  return std::exchange(count_, kept) != kept;
+}
+
+std::size_t OutputRecipe::offset(std::string_view name) const noexcept {
+  std::size_t offset = 0;
+  for (const Variable& variable : variables()) {
+    if (variable.name == name) return offset;
+    offset += wire_size(variable.type);
+  }
+  return 0;
+}
+
+ControllerStatus decode_status(Bytes fields) noexcept {
+  return {load<std::int32_t>(fields, kRobotMode),   load<std::int32_t>(fields, kSafetyStatus),
+          load<std::uint32_t>(fields, kSafetyBits), load<std::uint32_t>(fields, kRuntimeState),
+          load<std::int32_t>(fields, kVersion),     0};
+}
+
 ArmCondition arm_condition(const ControllerStatus& status) noexcept {
   constexpr std::uint32_t kStopBits = 0b111'1111'1100;  // b2 (protective stop) to b10 (stopped due to safety)
   if (is_emergency(status)) return ArmCondition::kEmergencyStop;
@@ -91,9 +123,7 @@ bool decode_state(Bytes fields, ArmState& state) noexcept {
   state.q_rad = q_rad;
   state.qd_rad_s = qd_rad_s;
   state.q_target_rad = q_target_rad;
-  const ControllerStatus status{load<std::int32_t>(fields, kRobotMode), load<std::int32_t>(fields, kSafetyStatus),
-                                load<std::uint32_t>(fields, kSafetyBits), load<std::uint32_t>(fields, kRuntimeState),
-                                load<std::int32_t>(fields, kVersion)};
+  const ControllerStatus status = decode_status(fields);
   state.condition = arm_condition(status);
   state.tracking =
       state.condition == ArmCondition::kReady && load<std::int32_t>(fields, kProgramState) == kTrackingState;

@@ -5,7 +5,7 @@
 
 namespace embody::rtde {
 
-/// What we subscribe to: 260 bytes per package.
+/// What every supported firmware has: 260 bytes per package.
 inline constexpr std::array<Variable, 17> kOutputRecipe{{
     {"timestamp", DataType::kDouble},
     {"actual_q", DataType::kVector6d},
@@ -25,6 +25,31 @@ inline constexpr std::array<Variable, 17> kOutputRecipe{{
     {"output_int_register_26", DataType::kInt32},
     {"output_int_register_27", DataType::kInt32},
 }};
+
+/// What newer firmware has in addition: subscribed to after kOutputRecipe, without those that the controller does not
+/// know.
+inline constexpr std::array<Variable, 4> kOptionalOutputs{{
+    {"time_scale_source", DataType::kInt32},
+    {"payload", DataType::kDouble},
+    {"payload_cog", DataType::kVector3d},
+    {"tcp_offset", DataType::kVector6d},
+}};
+
+/// The output recipe of one session: kOutputRecipe and the optional variables that the controller has.
+class OutputRecipe {
+ public:
+  OutputRecipe() noexcept;
+  /// Leaves out the optional variables that `reply` marks as NOT_FOUND; false when there are none of these.
+  [[nodiscard]] bool drop_unknown(std::string_view reply_types) noexcept;
+  [[nodiscard]] std::span<const Variable> variables() const noexcept { return std::span(variables_).first(count_); }
+  [[nodiscard]] std::size_t size() const noexcept { return fields_size(variables()); }
+  /// Where the optional variable `name` starts in the fields, 0 when the session does without.
+  [[nodiscard]] std::size_t offset(std::string_view name) const noexcept;
+
+ private:
+  std::array<Variable, kOutputRecipe.size() + kOptionalOutputs.size()> variables_{};
+  std::size_t count_{0};
+};
 
 /// What we write: 108 bytes per package. Registers 24 to 47 are reserved for external RTDE clients.
 inline constexpr std::array<Variable, 14> kInputRecipe{{
@@ -56,6 +81,14 @@ struct ControllerStatus {
   std::uint32_t safety_status_bits{0};
   std::uint32_t runtime_state{0};
   std::int32_t program_version{0};
+  std::int32_t time_scale_source{0};  ///< why the speed is limited (status_text.hpp)
+};
+
+/// Settings of the installation that an arm must have right, as the controller reports them.
+struct ArmSettings {
+  double payload_kg{0.0};
+  std::array<double, 3> cog_m{};  ///< centre of gravity of the payload in the flange frame
+  std::array<double, 6> tcp{};    ///< tool centre point in the flange frame: position (m), rotation vector (rad)
 };
 
 /// Ready only if powered and running, safety normal or reduced, no stop bit set, and our control program playing.
@@ -63,10 +96,13 @@ struct ControllerStatus {
 /// and enabling-device stops), not running, program stopped.
 [[nodiscard]] ArmCondition arm_condition(const ControllerStatus& status) noexcept;
 
+/// Modes of a package. @pre fields.size() >= fields_size(kOutputRecipe)
+[[nodiscard]] ControllerStatus decode_status(Bytes fields) noexcept;
+
 /// Fills everything but `package` and `t_arrival` from the fields of an output package. False, with `state` unchanged,
 /// when the time stamp or a joint value is not finite. `tracking` is true only while `condition` is kReady: a stopped
 /// program leaves its last state in the register.
-/// @pre fields.size() == fields_size(kOutputRecipe)
+/// @pre fields.size() >= fields_size(kOutputRecipe)
 [[nodiscard]] bool decode_state(Bytes fields, ArmState& state) noexcept;
 
 /// Fills a whole input package. Targets are written for kTrack only, zeros otherwise.

@@ -103,10 +103,72 @@ const char* program_fault_text(int fault) noexcept {
       return "the first target was too far from the arm";
     case 4:
       return "a target was out of range or not a number";
-    case 8:
-      return "a target pose has no joint solution";
+    case 16:
+      return "the arm was stopped or moved by something else";
     default:
       return "unknown program fault";
+  }
+}
+
+const char* time_scale_text(int time_scale_source) noexcept {
+  switch (time_scale_source) {
+    case 0:
+      return "not running";
+    case 1:
+      return "full speed";
+    case 2:
+      return "joint torque limit";
+    case 3:
+      return "joint acceleration limit";
+    case 4:
+      return "power supply limit";
+    case 5:
+      return "momentum limit";
+    case 6:
+      return "stopping time limit";
+    case 7:
+      return "stopping distance limit";
+    case 8:
+      return "tool speed limit";
+    case 9:
+      return "elbow speed limit";
+    case 10:
+      return "joint speed limit";
+    case 11:
+      return "change of the safety mode";
+    default:
+      return "unknown speed limit";
+  }
+}
+
+const char* safety_advice(int safety_status) noexcept {
+  switch (safety_status) {
+    case 1:
+    case 2:
+      return "";
+    case 3:
+      return "look for its cause, then release it on the teach pendant";
+    case 4:
+      return "move the arm back inside its limits with the teach pendant";
+    case 5:
+    case 12:
+    case 22:
+      return "close the safeguard (door, light curtain), and reset it where needed";
+    case 6:
+    case 7:
+    case 15:
+    case 16:
+      return "unlock the emergency stop button, then power the robot on";
+    case 13:
+    case 14:
+      return "hold the three-position enabling device in its middle position";
+    case 17:
+    case 18:
+    case 19:
+    case 20:
+      return "release the stop at the PROFIsafe controller";
+    default:
+      return "see the message on the teach pendant";
   }
 }
 

@@ -5,28 +5,16 @@
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
+#include "drivers/ur_rtde/program_upload.hpp"
 
 namespace embody {
 namespace {
 
 using rtde::PackageType;
-
-constexpr double kSeriesRate = 500.0;  // Hz: control cycles of e-Series and later
-constexpr double kCb3Rate = 125.0;     // Hz
-
-double control_rate_hz(const rtde::ControllerVersion& version) noexcept {
-  return version.major <= 3 ? kCb3Rate : kSeriesRate;
-}
-
-/// The controller sends one package each floor(control rate / wanted rate) cycles.
-double package_rate_hz(double control_hz, double wanted_hz) noexcept {
-  return control_hz / std::max(1.0, std::floor(control_hz / wanted_hz));
-}
 
 /// Bytes handed to our kernel that the controller's kernel has not acknowledged yet.
 int unacknowledged_bytes(int fd) noexcept {
@@ -36,149 +24,74 @@ int unacknowledged_bytes(int fd) noexcept {
 
 }  // namespace
 
-UrRtdeArm::UrRtdeArm(UrRtdeConfig config) : config_(std::move(config)) {}
+UrRtdeArm::UrRtdeArm(UrRtdeConfig config) : config_(std::move(config)), echo_(config_.echo_patience) {}
 
 UrRtdeArm::~UrRtdeArm() {
   close_session();
 }
 
 Result<ArmInfo> UrRtdeArm::connect() {
+  constexpr double kFastest_hz = 500.0;
   close_session();
   reason_ = {};
   last_text_ = {};
-  if (!(config_.frequency_hz >= 1.0 && config_.frequency_hz <= kSeriesRate)) {
+  shared_.reset();
+  if (!(config_.frequency_hz >= 1.0 && config_.frequency_hz <= kFastest_hz)) {
     return make_error(Errc::kInvalidArgument, "the arm's frequency is %g Hz; choose 1 to 500", config_.frequency_hz);
   }
+  const auto script = rtde::control_script(config_.script);
+  if (config_.upload && !script) return script.error();
   const TimePoint start = transport::now();
-  const TimePoint deadline = start + config_.in_use_patience + config_.reply_timeout;
   auto fd = transport::tcp_connect(config_.host, config_.port, start + config_.reply_timeout);
   if (!fd) return fd.error();
   fd_ = std::move(*fd);
   buffer_.clear();
+  rtde::Setup setup(fd_.get(), buffer_,
+                    {config_.frequency_hz, config_.reply_timeout, config_.in_use_patience, last_sequence_});
+  const auto session = setup.run(start + config_.in_use_patience + config_.reply_timeout);
+  last_text_ = setup.last_text();
+  if (!session) return give_up(session.error());
+  session_ = *session;
+  time_scale_offset_ = session_.outputs.offset("time_scale_source");
+  const bool has_settings = session_.outputs.offset("payload") != 0 && session_.outputs.offset("payload_cog") != 0 &&
+                            session_.outputs.offset("tcp_offset") != 0;
+  settings_offset_ = has_settings ? session_.outputs.offset("payload") : 0;
+  streaming_ = true;
+  packages_ = 0;
+  blocked_since_ = {};
+  controller_time_ = Duration::min();
+  t_advanced_ = t_received_ = transport::now();
+  echo_.reset(last_sequence_);
+  program_.reset();
+  if (config_.upload) {
+    program_ = std::make_unique<ur::ProgramUpload>(ur::ProgramUploadConfig{
+        .host = config_.host, .port = config_.primary_port, .program = *script, .retry_after = config_.upload_retry});
+  }
 
-  const auto version = negotiate(deadline);
-  if (!version) return give_up(version.error());
-  const double control_hz = control_rate_hz(*version);
-  const double wanted_hz = std::min(config_.frequency_hz, control_hz);
-  if (const Status done = setup_outputs(wanted_hz, deadline); !done) return give_up(done.error());
-  if (const Status done = setup_inputs(deadline); !done) return give_up(done.error());
-  if (const Status done = start_stream(deadline); !done) return give_up(done.error());
-
+  const auto& version = session_.version;
   const std::string release =
-      std::to_string(version->major) + "." + std::to_string(version->minor) + "." + std::to_string(version->bugfix);
-  ArmInfo info{fd_.get(), package_rate_hz(control_hz, wanted_hz), {}};
+      std::to_string(version.major) + "." + std::to_string(version.minor) + "." + std::to_string(version.bugfix);
+  ArmInfo info{fd_.get(), session_.rate_hz, {}};
   info.peer = std::string_view("UR controller " + release + " at " + config_.host + ":" + std::to_string(config_.port));
   return info;
 }
 
 Status UrRtdeArm::service() {
-  return {};
-}
-
-Result<rtde::ControllerVersion> UrRtdeArm::negotiate(TimePoint deadline) {
-  constexpr std::uint16_t kVersion = 2;
-  auto reply = exchange(PackageType::kProtocolVersion, rtde::encode_protocol_request(kVersion), deadline);
-  if (!reply) return reply.error();
-  const auto accepted = rtde::decode_accepted(reply->payload);
-  if (!accepted) return make_error(Errc::kMalformed, "the reply about the protocol version is not an RTDE reply");
-  if (!*accepted) {
-    return make_error(Errc::kUnsupported, "the controller does not speak RTDE version 2: update its firmware");
-  }
-  reply = exchange(PackageType::kControllerVersion, rtde::encode_request(PackageType::kControllerVersion), deadline);
-  if (!reply) return reply.error();
-  const auto version = rtde::decode_controller_version(reply->payload);
-  if (!version) return make_error(Errc::kMalformed, "the controller's version has a wrong size");
-  return *version;
-}
-
-Status UrRtdeArm::setup_outputs(double frequency_hz, TimePoint deadline) {
-  const std::string names = rtde::join_names(rtde::kOutputRecipe);
-  const auto frame = exchange(PackageType::kSetupOutputs, rtde::encode_outputs_request(frequency_hz, names), deadline);
-  if (!frame) return frame.error();
-  const auto reply = rtde::decode_setup_reply(frame->payload);
-  if (!reply) return make_error(Errc::kMalformed, "the reply to the output recipe is empty");
-  output_recipe_ = reply->recipe;
-  return rtde::check_setup_reply(rtde::kOutputRecipe, *reply);
-}
-
-// After a cable was pulled the controller keeps our registers for the lost session until its TCP gives up: try again.
-Status UrRtdeArm::setup_inputs(TimePoint deadline) {
-  constexpr Duration kFirstPause = std::chrono::milliseconds(100);
-  constexpr Duration kLongestPause = std::chrono::milliseconds(800);
-  const auto request = rtde::encode_inputs_request(rtde::join_names(rtde::kInputRecipe));
-  const TimePoint give_up = transport::now() + config_.in_use_patience;
-  for (Duration pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
-    const auto frame = exchange(PackageType::kSetupInputs, request, deadline);
-    if (!frame) return frame.error();
-    const auto reply = rtde::decode_setup_reply(frame->payload);
-    if (!reply) return make_error(Errc::kMalformed, "the reply to the input recipe is empty");
-    input_recipe_ = reply->recipe;
-    const Status check = rtde::check_setup_reply(rtde::kInputRecipe, *reply);
-    const bool in_use = !check && check.error().code == Errc::kRefused;
-    if (!in_use || transport::now() + pause > give_up) return check;
-    if (const Status waited = idle_until(transport::now() + pause); !waited) return waited;
-  }
-}
-
-// Mode 0 goes out before the stream starts: registers keep what a lost session wrote.
-Status UrRtdeArm::start_stream(TimePoint deadline) {
-  if (send_hold(last_sequence_) != IoStatus::kDone) {
-    return make_error(Errc::kDisconnected, "the controller closed the connection during the set-up");
-  }
-  const auto frame = exchange(PackageType::kStart, rtde::encode_request(PackageType::kStart), deadline);
-  if (!frame) return frame.error();
-  const auto accepted = rtde::decode_accepted(frame->payload);
-  if (!accepted) return make_error(Errc::kMalformed, "the reply to the start request has a wrong size");
-  if (!*accepted) return make_error(Errc::kRefused, "the controller refuses to start the RTDE stream");
-  streaming_ = true;
-  packages_ = 0;
-  blocked_since_ = {};
-  t_received_ = transport::now();
-  return {};
-}
-
-Result<rtde::Frame> UrRtdeArm::exchange(PackageType type, rtde::Bytes request, TimePoint deadline) {
-  const TimePoint reply_by = std::min(deadline, transport::now() + config_.reply_timeout);
-  if (const Status sent = transport::send_all(fd_.get(), request, reply_by); !sent) return sent.error();
-  while (true) {
-    const auto parsed = next_frame(reply_by);
-    if (!parsed) return parsed.error();
-    if (parsed->framing == rtde::Framing::kComplete && parsed->frame.is(type)) return parsed->frame;
-    if (parsed->framing == rtde::Framing::kIncomplete || transport::now() >= reply_by) {
-      return make_error(Errc::kTimeout, "no reply to the RTDE request '%c' within %.1f s", static_cast<char>(type),
-                        to_seconds(config_.reply_timeout));
+  if (program_ != nullptr) {
+    if (const Status done = program_->service(shared_); !done) return done;
+    if (const auto& reported = program_->kinematics()) {
+      if (const Status fits = ur::check_geometry(config_.expected, *reported, session_.version.major); !fits) {
+        return fits;
+      }
     }
   }
+  const bool known = settings_offset_ != 0 && shared_.snapshot().packages > 0;
+  if (!known || !config_.expected.has_settings()) return {};
+  return ur::check_settings(config_.expected, shared_.settings());
 }
 
-Status UrRtdeArm::idle_until(TimePoint until) {
-  while (true) {
-    const auto parsed = next_frame(until);
-    if (!parsed) return parsed.error();
-    if (parsed->framing == rtde::Framing::kIncomplete || transport::now() >= until) return {};
-  }
-}
-
-/// The next package of any type, or framing kIncomplete at the deadline.
-Result<rtde::ParsedFrame> UrRtdeArm::next_frame(TimePoint deadline) {
-  while (true) {
-    const rtde::ParsedFrame parsed = buffer_.next();
-    if (parsed.framing == rtde::Framing::kBroken) {
-      return make_error(Errc::kMalformed, "the peer does not speak RTDE (a package smaller than its header)");
-    }
-    if (parsed.framing == rtde::Framing::kComplete) {
-      if (parsed.frame.is(PackageType::kText)) remember_text(parsed.frame.payload);
-      return parsed;
-    }
-    if (!transport::wait_readable(fd_.get(), deadline)) return parsed;
-    const auto received = transport::receive(fd_.get(), buffer_.space());
-    if (received.status == IoStatus::kDisconnected) {
-      return make_error(
-          Errc::kDisconnected,
-          "the controller closed the connection during the set-up: too many RTDE clients, or it restarts");
-    }
-    buffer_.commit(received.size);
-  }
+std::optional<ur::UrKinematics> UrRtdeArm::kinematics() const {
+  return program_ == nullptr ? std::nullopt : program_->kinematics();
 }
 
 /// Ends the failed set-up and adds where it happened, and the controller's last words.
@@ -188,34 +101,71 @@ Error UrRtdeArm::give_up(const Error& error) {
                     last_text_.empty() ? "" : "; the controller says: ", last_text_.c_str());
 }
 
-void UrRtdeArm::remember_text(rtde::Bytes payload) noexcept {
-  if (const auto text = rtde::decode_text(payload)) last_text_ = text->message;
-}
-
 IoStatus UrRtdeArm::read(ArmState& state) noexcept {
   constexpr int kReceives = 2;  // the second one finishes a package that the first one cut
   for (int receives = 0; streaming_;) {
     const rtde::ParsedFrame parsed = buffer_.next();
     if (parsed.framing == rtde::Framing::kBroken) return end_session("the controller's bytes are not RTDE packages");
     if (parsed.framing == rtde::Framing::kComplete) {
-      if (parsed.frame.is(PackageType::kText)) remember_text(parsed.frame.payload);
-      if (!parsed.frame.is(PackageType::kData)) continue;
-      const auto fields =
-          rtde::decode_data(parsed.frame.payload, output_recipe_, rtde::fields_size(rtde::kOutputRecipe));
-      if (!fields) return end_session("a data package does not fit the recipe");
-      if (!rtde::decode_state(*fields, state)) return end_session("the controller sent values that are not finite");
-      state.package = ++packages_;
-      state.t_arrival = t_received_;
-      return IoStatus::kDone;
+      const IoStatus taken = take_frame(parsed.frame, state);
+      if (taken == IoStatus::kEmpty) continue;
+      return taken;
     }
-    if (receives++ == kReceives) return IoStatus::kEmpty;
+    if (receives++ == kReceives) return check_clock();
     const auto received = transport::receive(fd_.get(), buffer_.space());
     if (received.status == IoStatus::kDisconnected) return end_session("the controller closed the connection");
-    if (received.status == IoStatus::kEmpty) return IoStatus::kEmpty;
+    if (received.status == IoStatus::kEmpty) return check_clock();
     t_received_ = transport::now();
     buffer_.commit(received.size);
   }
   return IoStatus::kDisconnected;
+}
+
+/// kDone for a state, kEmpty for anything else that may be skipped.
+IoStatus UrRtdeArm::take_frame(const rtde::Frame& frame, ArmState& state) noexcept {
+  if (frame.is(PackageType::kText)) {
+    if (const auto text = rtde::decode_text(frame.payload)) last_text_ = text->message;
+  }
+  if (!frame.is(PackageType::kData)) return IoStatus::kEmpty;
+  const auto fields = rtde::decode_data(frame.payload, session_.output_id, session_.outputs.size());
+  if (!fields) return end_session("a data package does not fit the recipe");
+  return take_state(*fields, state);
+}
+
+IoStatus UrRtdeArm::take_state(rtde::Bytes fields, ArmState& state) noexcept {
+  if (!rtde::decode_state(fields, state)) return end_session("the controller sent values that are not finite");
+  if (state.controller_time < controller_time_) return end_session("the controller restarted: its clock went back");
+  if (state.controller_time > controller_time_) t_advanced_ = t_received_;
+  controller_time_ = state.controller_time;
+  state.package = ++packages_;
+  state.t_arrival = t_received_;
+  echo_.seen(state.echo_sequence, t_received_);
+  const bool answers = echo_.answers(t_received_);
+  if (!answers && state.condition == ArmCondition::kReady) {
+    state.condition = ArmCondition::kProgramStopped;
+    state.tracking = false;
+  }
+  rtde::ControllerStatus status = rtde::decode_status(fields);
+  if (time_scale_offset_ != 0) status.time_scale_source = rtde::load<std::int32_t>(fields, time_scale_offset_);
+  if (settings_offset_ != 0) publish_settings(fields);
+  shared_.publish(packages_, status, answers);
+  return t_received_ - t_advanced_ > config_.stale_after ? check_clock() : IoStatus::kDone;
+}
+
+void UrRtdeArm::publish_settings(rtde::Bytes fields) noexcept {
+  rtde::ArmSettings settings;
+  std::size_t offset = settings_offset_;
+  const auto take = [&] { return rtde::load<double>(fields, std::exchange(offset, offset + sizeof(double))); };
+  settings.payload_kg = take();
+  for (double& value : settings.cog_m) value = take();
+  for (double& value : settings.tcp) value = take();
+  shared_.publish_settings(settings);
+}
+
+/// kEmpty while the controller's clock advances.
+IoStatus UrRtdeArm::check_clock() noexcept {
+  if (transport::now() - t_advanced_ <= config_.stale_after) return IoStatus::kEmpty;
+  return end_session("the controller fell silent, or its clock stands still");
 }
 
 // The newest command wins: after an interruption the controller must not find a pile of old ones.
@@ -225,25 +175,20 @@ IoStatus UrRtdeArm::write(const ArmCommand& command, TimePoint now) noexcept {
   if (now > command.t_expires) return IoStatus::kRefused;
   const bool finite = command.q_rad.allFinite() && command.qd_rad_s.allFinite();
   if (command.action == ArmAction::kTrack && !finite) return IoStatus::kRefused;
-  rtde::encode_command(command, input_recipe_, package_);
+  rtde::encode_command(command, session_.input_id, package_);
   const bool backlog = unacknowledged_bytes(fd_.get()) > kMostUnacknowledged;
   const IoStatus status = backlog ? IoStatus::kEmpty : transport::send_message(fd_.get(), package_);
   if (status == IoStatus::kDisconnected) return end_session("the controller closed the connection");
   if (status == IoStatus::kDone) {
     last_sequence_ = command.sequence & rtde::kSequenceMask;
+    echo_.sent(last_sequence_, now);
+    shared_.count_command();
     blocked_since_ = {};
     return status;
   }
   if (blocked_since_ == TimePoint{}) blocked_since_ = now;
   if (now - blocked_since_ > config_.backlog_limit) return end_session("commands do not reach the controller any more");
   return status;
-}
-
-IoStatus UrRtdeArm::send_hold(std::uint32_t sequence) noexcept {
-  ArmCommand hold;
-  hold.sequence = sequence;
-  rtde::encode_command(hold, input_recipe_, package_);
-  return transport::send_message(fd_.get(), package_);
 }
 
 IoStatus UrRtdeArm::end_session(std::string_view reason) noexcept {
@@ -256,7 +201,12 @@ IoStatus UrRtdeArm::end_session(std::string_view reason) noexcept {
 void UrRtdeArm::close_session() noexcept {
   constexpr Duration kPatience = std::chrono::milliseconds(100);
   if (!fd_) return;
-  if (input_recipe_ != 0) (void)send_hold(last_sequence_ + 1);
+  if (session_.input_id != 0) {
+    ArmCommand hold;
+    hold.sequence = last_sequence_ + 1;
+    rtde::encode_command(hold, session_.input_id, package_);
+    (void)transport::send_message(fd_.get(), package_);
+  }
   ::shutdown(fd_.get(), SHUT_WR);
   const TimePoint deadline = transport::now() + kPatience;
   buffer_.clear();
@@ -265,7 +215,7 @@ void UrRtdeArm::close_session() noexcept {
   }
   fd_.reset();
   streaming_ = false;
-  input_recipe_ = output_recipe_ = 0;
+  session_ = {};
 }
 
 }  // namespace embody

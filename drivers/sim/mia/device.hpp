@@ -4,11 +4,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "drivers/mia/codec.hpp"
-#include "drivers/sim/mia/mia_simulator.hpp"
-#include "drivers/sim/mia/motor.hpp"
+#include "drivers/sim/mia/body.hpp"
 
 namespace embody::sim {
 
@@ -28,44 +27,56 @@ class MiaDevice {
   /// The host has gone: half a frame and replies under way are forgotten; motion and streams go on.
   void forget_host() noexcept;
 
-  [[nodiscard]] std::array<double, mia::kMotors> motor_counts() const noexcept;
-  [[nodiscard]] std::array<double, mia::kMotors> joint_angles_rad() const noexcept;
-  [[nodiscard]] std::vector<MiaSample> log() const;
+  [[nodiscard]] std::array<double, mia::kMotors> motor_counts() const noexcept { return body_.motor_counts(); }
+  [[nodiscard]] std::array<double, mia::kMotors> joint_angles_rad() const noexcept { return body_.joint_angles_rad(); }
+  [[nodiscard]] std::vector<MiaSample> log() const { return body_.log(); }
   [[nodiscard]] MiaSimulatorCounters counters() const noexcept;
 
-  void mute(bool on) noexcept { mute_ = on; }
-  void drop_next(unsigned n) noexcept { drop_ = n; }
-  void garble_next(unsigned n) noexcept { garble_ = n; }
+  void mute(bool on) noexcept { faults_.mute = on; }
+  void drop_next(unsigned n) noexcept { faults_.drop = n; }
+  void garble_next(unsigned n) noexcept { faults_.garble = n; }
+  /// The hand restarts: deaf and mute for a while, streams off, motors standing, counters zero.
+  void restart(TimePoint now);
+  /// One fault by name: "drop n" and "garble n" (lines), "drop_ack n", "echo_wrong n" (ACK of another command),
+  /// "deaf n" (commands not heard), "rubbish n" (bytes), "delay ms", "jitter ms", "mute on|off", "half_duplex on|off",
+  /// "reboot", "streams off", "undervoltage on|off" (restarts whenever a motor is to move), "stall MOTOR on|off",
+  /// "contact MOTOR counts|off", with MOTOR thumb, index or mrl. Errors: kInvalidArgument.
+  Status fault(std::string_view text, TimePoint now);
 
  private:
   struct Pending {
     TimePoint due{};
     mia::Command command{};
   };
+  struct Faults {
+    bool mute{false};
+    bool undervoltage{false};
+    unsigned drop{0};
+    unsigned drop_ack{0};
+    unsigned garble{0};
+    unsigned echo_wrong{0};
+    unsigned deaf{0};
+    unsigned rubbish{0};
+  };
 
-  void record(TimePoint t);
-  void execute(const mia::Request& request);
+  [[nodiscard]] bool knows(mia::Request::Kind kind, char first) const noexcept;
+  void execute(const mia::Command& command, const mia::Request& request);
   void switch_stream(char channel, bool on) noexcept;
-  [[nodiscard]] std::optional<mia::DataLine> data_line(char channel) const noexcept;
-  [[nodiscard]] std::array<double, mia::kMotors> joint_speeds_rad_s() const noexcept;
   void answer(const mia::Command& command, std::string& out);
   bool say(std::string_view line, std::string& out);
+  [[nodiscard]] Duration delay();
+  Status set_motor_fault(std::string_view name, std::string_view motor, std::string_view value);
 
   MiaSimulatorConfig config_;
-  std::array<MiaMotor, mia::kMotors> motors_;
-  std::array<int, mia::kMotors> current_percent_{50, 50, 50};
+  MiaBody body_;
   mia::CommandAssembler commands_;
   std::deque<Pending> pending_;
-  TimePoint now_;
-  TimePoint next_sample_;
   TimePoint next_stream_;
+  TimePoint booted_at_;
   std::string streams_;  ///< channels that are on
-  std::vector<MiaSample> log_;
-  std::size_t log_begin_{0};
+  std::mt19937_64 random_;
   MiaSimulatorCounters counters_;
-  bool mute_{false};
-  unsigned drop_{0};
-  unsigned garble_{0};
+  Faults faults_;
 };
 
 }  // namespace embody::sim

@@ -59,6 +59,13 @@ class MiaSimulator::Device {
     return pty_.device;
   }
 
+  /// The hand has something else to do now: whoever waits looks again.
+  void wake() noexcept {
+    const std::scoped_lock lock(life_);
+    const std::uint64_t one = 1;
+    if (wake_) static_cast<void>(!::write(wake_.get(), &one, sizeof one));
+  }
+
   /// Calls `function` with the hand as it is now.
   template <class Function>
   auto with_hand(Function function) {
@@ -113,8 +120,10 @@ class MiaSimulator::Device {
       left = {span.count() / 1'000'000'000, span.count() % 1'000'000'000};
     }
     std::array<pollfd, 2> entries{pollfd{pty_.master.get(), POLLIN, 0}, woken};
-    return ::ppoll(entries.data(), entries.size(), deadline ? &left : nullptr, nullptr) > 0 ? entries[0].revents
-                                                                                            : short{0};
+    if (::ppoll(entries.data(), entries.size(), deadline ? &left : nullptr, nullptr) <= 0) return 0;
+    std::uint64_t count = 0;
+    if (entries[1].revents != 0 && !leave_) static_cast<void>(!::read(wake_.get(), &count, sizeof count));
+    return entries[0].revents;
   }
 
   void take_bytes() {
@@ -200,6 +209,14 @@ void MiaSimulator::drop_next(unsigned n) {
 
 void MiaSimulator::garble_next(unsigned n) {
   device_->with_hand([n](MiaDevice& hand) { hand.garble_next(n); });
+}
+
+Status MiaSimulator::fault(std::string_view text) {
+  if (text == "unplug") return unplug(), Status{};
+  if (text == "plug") return start();
+  const Status done = device_->with_hand([text](MiaDevice& hand) { return hand.fault(text, transport::now()); });
+  device_->wake();
+  return done;
 }
 
 }  // namespace embody::sim

@@ -2,26 +2,47 @@
 // A Mia hand that exists only as a pseudo-terminal: speaks the real bytes, moves with a first-order lag.
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
-#include "drivers/mia/transmission.hpp"
+#include "drivers/mia/mia_config.hpp"
 
 namespace embody::sim {
 
 struct MiaSimulatorConfig {
-  std::string link;  ///< path of a symlink to the device; empty: none
+  std::string link;                                             ///< path of a symlink to the device; empty: none
+  mia::Generation generation{mia::Generation::kAcknowledging};  ///< which commands and replies it knows
   Duration ack_delay{std::chrono::milliseconds(2)};
+  Duration ack_jitter{0};  ///< added to the delay, uniform from zero
   double lag_s{0.04};
   bool half_duplex{true};  ///< a command that comes before the ACK of the last one is dropped and counted
+  bool acks_all{true};     ///< acknowledges every frame, known or not; off: a streaming hand acknowledges nothing
   double stream_hz{50.0};  ///< of each data stream that the host switches on
   std::array<double, mia::kMotors> start_counts{0.0, 0.0, 0.0};  ///< thumb, index, MRL
-  std::size_t log_capacity{60'000};                              ///< samples; the newest are kept (100 per second)
-  mia::Transmission transmission;                                ///< for the joint angles of the log
+  /// Where closing meets an object.
+  std::array<double, mia::kMotors> contact_counts{std::numeric_limits<double>::infinity(),
+                                                  std::numeric_limits<double>::infinity(),
+                                                  std::numeric_limits<double>::infinity()};
+  double strain_noise{4.5};                            ///< standard deviation, raw units
+  Duration boot_time{std::chrono::milliseconds(200)};  ///< deaf and mute after a restart
+  Duration calibration_time{std::chrono::milliseconds(2000)};
+  std::uint64_t seed{1};
+  std::size_t log_capacity{60'000};  ///< samples; the newest are kept (100 per second)
+  mia::Transmission transmission;    ///< for the joint angles of the log
 };
+
+/// A hand with the firmware of the vendor's ROS 1 driver: streams, no readings on request, no stop command.
+[[nodiscard]] inline MiaSimulatorConfig older_mia() {
+  MiaSimulatorConfig config;
+  config.generation = mia::Generation::kStreaming;
+  config.half_duplex = false;
+  return config;
+}
 
 /// One line of the motion log.
 struct MiaSample {
@@ -38,6 +59,10 @@ struct MiaSimulatorCounters {
   std::uint64_t dropped_as_early{0};  ///< came before the ACK of the last one
   std::uint64_t skipped_bytes{0};     ///< rubbish between frames
   std::uint64_t acks{0};              ///< sent, garbled ones included
+  std::uint64_t grasps{0};            ///< of commands: automatic grasps and their references
+  std::uint64_t calibrations{0};      ///< of commands
+  std::uint64_t stores{0};            ///< of commands: writes to the EEPROM
+  std::uint64_t restarts{0};
 };
 
 /// One thread between start() and stop(). Every function may be called from any thread, but start() and stop() only
@@ -58,7 +83,7 @@ class MiaSimulator {
   [[nodiscard]] std::string device() const;
 
   [[nodiscard]] MiaSimulatorCounters counters() const;
-  [[nodiscard]] std::array<double, mia::kMotors> motor_counts() const;
+  [[nodiscard]] std::array<double, mia::kMotors> motor_counts() const;  ///< where the motors are
   [[nodiscard]] std::array<double, mia::kMotors> joint_angles_rad() const;
   [[nodiscard]] std::vector<MiaSample> log() const;  ///< oldest first
 
@@ -67,6 +92,8 @@ class MiaSimulator {
   void drop_next(unsigned n);    ///< the next n lines are not sent
   void garble_next(unsigned n);  ///< the next n lines are sent with '#' in place of everything but first byte and LF
   void unplug();                 ///< the host sees a hang-up; returns when that is so
+  /// By name: "unplug", "plug", and those of MiaDevice::fault(). Errors: kInvalidArgument, with the names that exist.
+  Status fault(std::string_view text);
 
  private:
   class Device;

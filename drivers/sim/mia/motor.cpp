@@ -20,7 +20,7 @@ MiaMotor::MiaMotor(mia::Motor motor, double counts, double lag_s) noexcept
 
 void MiaMotor::move_to(double target_counts, int speed_percent) noexcept {
   mode_ = Mode::kPosition;
-  target_ = std::clamp<double>(target_counts, min_counts_, mia::kMaxCounts);
+  target_ = std::clamp<double>(target_counts, min_counts_, mia::kMaxCounts) + zero_;
   limit_ = std::clamp(speed_percent, 0, 99) * 0.01 * kMaxSpeed * counts_per_s_per_unit_;
   blocked_ = false;
 }
@@ -37,7 +37,24 @@ void MiaMotor::halt() noexcept {
   blocked_ = false;
 }
 
+void MiaMotor::lose_counter() noexcept {
+  halt();
+  zero_ = counts_;
+}
+
+void MiaMotor::begin_calibration(int speed_percent) noexcept {
+  move_to(0.0, speed_percent);
+  target_ = 0.0;
+}
+
 void MiaMotor::advance(double dt_s) noexcept {
+  if (stalled_) {
+    rate_ = 0.0;
+    const bool wants =
+        mode_ == Mode::kPosition ? std::abs(target_ - counts_) > 0.5 : mode_ == Mode::kSpeed && command_ != 0.0;
+    blocked_ = wants;
+    return;
+  }
   if (mode_ == Mode::kPosition) approach(dt_s);
   if (mode_ == Mode::kSpeed) coast(dt_s);
 }
@@ -54,6 +71,7 @@ void MiaMotor::approach(double dt_s) noexcept {
   error *= std::exp(-dt_s / lag_s_);
   counts_ = target_ - direction * error;
   rate_ = direction * std::min(limit_, error / lag_s_);
+  stay_inside(true);
 }
 
 /// d(rate)/dt = (command - rate) / lag until an end of the range is reached.
@@ -61,9 +79,14 @@ void MiaMotor::coast(double dt_s) noexcept {
   const double decay = std::exp(-dt_s / lag_s_);
   counts_ += command_ * dt_s + (rate_ - command_) * lag_s_ * (1.0 - decay);
   rate_ = command_ + (rate_ - command_) * decay;
-  const double inside = std::clamp<double>(counts_, min_counts_, mia::kMaxCounts);
+  stay_inside(command_ != 0.0);
+}
+
+void MiaMotor::stay_inside(bool pushing) noexcept {
+  const double highest = std::clamp(contact_, min_counts_, 1.0 * mia::kMaxCounts);
+  const double inside = std::clamp(counts_, min_counts_, highest);
   if (inside == counts_) return;
-  blocked_ = command_ != 0.0;
+  blocked_ = pushing;
   counts_ = inside;
   rate_ = 0.0;
 }

@@ -1,7 +1,8 @@
 #pragma once
-// A simulated Qualisys Track Manager: plays a recording over real sockets with the bytes of the real-time protocol
-// 1.8 to 1.28 (little-endian port, TCP, components 3D and 3DRes). Unlike QTM it serves no protocol before 1.8: a client
-// that asks for data without having sent `Version` is refused instead of getting 64-bit coordinates.
+// A simulated Qualisys Track Manager: plays a motion over real sockets with the bytes of the real-time protocol 1.8 to
+// 1.28 (both byte orders, TCP and UDP), and fails on request. Unlike QTM it serves no protocol before 1.8: a client
+// that asks for data without having sent `Version` is refused instead of getting 64-bit coordinates. Nothing here was
+// compared with a real QTM.
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -11,21 +12,14 @@
 
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
-#include "drivers/recording/recording.hpp"
+#include "drivers/sim/qtm/motion.hpp"
+#include "drivers/sim/qtm/qtm_config.hpp"
 
 namespace embody::sim {
 
-struct QtmServerConfig {
-  std::string address{"127.0.0.1"};
-  std::uint16_t port{0};  ///< 0: a free one
-  bool calibrated{true};
-  std::string axis{"+Z"};           ///< AxisUpwards of the 3D parameters
-  bool present_as_playback{false};  ///< state "RT from file" instead of a live measurement
-};
-
 /// One frame that went to at least one client.
 struct SentFrame {
-  std::size_t index{0};  ///< in the recording
+  std::size_t index{0};  ///< in the motion
   TimePoint t_sent{};    ///< just before the first send()
 };
 
@@ -33,36 +27,48 @@ struct SentFrame {
 class QtmServer {
  public:
   QtmServer(QtmServerConfig config, recording::Recording recording);
+  QtmServer(QtmServerConfig config, Motion motion);
   QtmServer(const QtmServer&) = delete;
   QtmServer& operator=(const QtmServer&) = delete;
   ~QtmServer();  ///< closes all connections and joins the thread
 
-  /// Listens and starts the thread. Errors: kInvalidArgument (address, empty recording), kIo (port taken).
+  /// Listens and starts the thread. Errors: kInvalidArgument (address, empty motion, body), kIo (port taken).
   [[nodiscard]] Status start();
-  [[nodiscard]] std::uint16_t port() const noexcept;
+  [[nodiscard]] std::uint16_t port() const noexcept;  ///< little endian
+  [[nodiscard]] std::uint16_t big_endian_port() const noexcept;
+  [[nodiscard]] std::uint16_t legacy_port() const noexcept;
+  [[nodiscard]] std::uint16_t discovery_port() const noexcept;
 
-  /// Plays the recording once from now on: frame k goes to every streaming client at t0 + k / rate. Before and after it
-  /// clients get NoMoreData. Further calls change nothing.
+  /// Plays the motion once from now on (for ever with `loop`): frame k goes to every streaming client at t0 + k / rate.
+  /// Before and after it clients get NoMoreData. Further calls change nothing. A master client can stop and start it.
   void play();
 
   [[nodiscard]] bool has_streaming_client() const;
-  [[nodiscard]] bool finished() const;  ///< the last frame's time has passed
+  [[nodiscard]] bool finished() const;  ///< the motion has come to its end
   [[nodiscard]] std::size_t frames_sent() const;
-  [[nodiscard]] std::vector<SentFrame> log() const;  ///< a copy
+  [[nodiscard]] std::vector<SentFrame> log() const;  ///< a copy; of the first million frames
 
-  /// Fault: no data for `duration`; sockets stay open, commands are answered, frames due meanwhile are skipped.
+  /// Makes something go wrong, from the next frame on: see fault_help() in fault_words.hpp for the words.
+  /// Errors: kInvalidArgument (words), kNotFound (no such marker or label).
+  Status fault(std::string_view words);
+  /// Faults at given times of every measurement from the next frame on; replaces the present script, faults that have
+  /// already happened stay. Errors name the line; nothing changes then.
+  [[nodiscard]] Status set_fault_script(std::string_view text);
+
+  // The faults that programs use most, without words.
+
+  /// No data for `duration`; sockets stay open, commands are answered, frames due meanwhile are lost.
   void pause(Duration duration);
-  /// Fault: closes every connection; new ones are accepted.
+  /// Closes every connection; new ones are accepted.
   void disconnect_clients();
-  /// Fault: the marker is missing from the next frame on, until shown again. False: no such label.
+  /// The marker is missing from the next frame on, until shown again. False: no such marker.
   bool set_marker_hidden(std::string_view name, bool hidden);
-  /// Fault: from the next frame on each of the two labels follows the other one's marker; again: as before. False: no
-  /// such labels.
+  /// Each of the two labels follows the other one's marker; again: as before. False: no such labels.
   bool swap_labels(std::string_view a, std::string_view b);
-  /// Fault: from the next frame on the label follows a reflection that stands still in the room, 0.1 m from where the
-  /// marker is in that frame, until switched off. False: no such label.
+  /// The marker is a reflection that stands still in the room, 0.1 m from where the marker is in the next frame. False:
+  /// no such marker.
   bool set_ghost(std::string_view name, bool on);
-  /// Fault: the label list changes without an event, as when somebody edits it in QTM. False: no such label.
+  /// The label list changes without an event, as when somebody edits it in QTM. False: no such label.
   bool rename_label(std::string_view from, std::string_view to);
 
  private:

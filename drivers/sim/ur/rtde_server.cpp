@@ -31,17 +31,37 @@ std::uint16_t RtdeServer::port() const noexcept {
   return transport::local_port(listener_.get());
 }
 
-void RtdeServer::receive(std::size_t max_clients) {
+void RtdeServer::receive(std::size_t max_clients, TimePoint now) {
+  constexpr Duration kOneTooMany = std::chrono::seconds(1);
+  shared_.now = now;
   while (transport::UniqueFd fd = transport::tcp_accept(listener_.get())) {
-    if (sessions_.size() >= max_clients) continue;
+    if (sessions_.size() >= 2 * max_clients) continue;
     bound_buffers(fd.get());
-    sessions_.emplace_back(shared_, std::move(fd), ++shared_.counters.clients_accepted);
+    const TimePoint expires = sessions_.size() < max_clients ? TimePoint::max() : now + kOneTooMany;
+    sessions_.emplace_back(shared_, std::move(fd), ++shared_.counters.clients_accepted, expires);
   }
   sessions_.remove_if([](RtdeSession& session) { return !session.receive(); });
 }
 
 void RtdeServer::publish(std::uint64_t previous, std::uint64_t cycle) {
   sessions_.remove_if([=](RtdeSession& session) { return !session.publish(previous, cycle); });
+}
+
+void RtdeServer::disconnect_all(bool by_reset) noexcept {
+  for (RtdeSession& session : sessions_) {
+    if (by_reset) session.reset_on_close();
+  }
+  sessions_.clear();
+}
+
+void RtdeServer::occupy_registers(bool occupied) {
+  // What a fieldbus adapter or a second program of this kind would hold.
+  for (int i = 24; i < 48; ++i) {
+    for (const char* kind : {"input_int_register_", "input_double_register_"}) {
+      std::uint64_t& owner = shared_.owners[shared_.variables.at(kind + std::to_string(i))];
+      if (owner == 0 || owner == kForeignOwner) owner = occupied ? kForeignOwner : 0;
+    }
+  }
 }
 
 bool RtdeServer::has_commanding_client() const noexcept {

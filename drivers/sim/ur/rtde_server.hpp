@@ -13,11 +13,13 @@ class RtdeServer {
   [[nodiscard]] Status listen(const std::string& address, std::uint16_t port);
   [[nodiscard]] std::uint16_t port() const noexcept;
 
-  /// Takes new clients (at most `max_clients` at a time, others are closed) and handles what they sent.
-  void receive(std::size_t max_clients);
+  /// Takes new clients and handles what they sent. More than `max_clients` may shake hands, but are closed after 1 s.
+  void receive(std::size_t max_clients, TimePoint now);
   /// Sends the present values to those clients whose package is due (RtdeSession::publish).
   void publish(std::uint64_t previous, std::uint64_t cycle);
-  void disconnect_all() noexcept { sessions_.clear(); }
+  void disconnect_all(bool by_reset = false) noexcept;
+  /// Somebody else owns the input registers 24 to 47, as far as no client of ours does.
+  void occupy_registers(bool occupied);
   [[nodiscard]] bool has_commanding_client() const noexcept;
 
   [[nodiscard]] RtdeShared& shared() noexcept { return shared_; }

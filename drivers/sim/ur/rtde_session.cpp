@@ -1,5 +1,7 @@
 #include "drivers/sim/ur/rtde_session.hpp"
 
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -21,15 +23,21 @@ std::uint64_t divider(double control_hz, double wanted_hz) noexcept {
 
 }  // namespace
 
-RtdeSession::RtdeSession(RtdeShared& shared, transport::UniqueFd fd, std::uint64_t id)
-    : shared_(shared), fd_(std::move(fd)), id_(id) {}
+RtdeSession::RtdeSession(RtdeShared& shared, transport::UniqueFd fd, std::uint64_t id, TimePoint expires)
+    : shared_(shared), fd_(std::move(fd)), id_(id), expires_(expires) {}
 
 RtdeSession::~RtdeSession() {
   std::replace(shared_.owners.begin(), shared_.owners.end(), id_, std::uint64_t{0});
 }
 
+void RtdeSession::reset_on_close() noexcept {
+  const linger at_once{1, 0};
+  ::setsockopt(fd_.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+}
+
 bool RtdeSession::receive() {
   constexpr int kReceives = 4;
+  if (shared_.now >= expires_ || !outbox_.pump(fd_.get(), shared_.link, shared_.now)) return false;
   for (int i = 0; i < kReceives; ++i) {
     const auto received = transport::receive(fd_.get(), buffer_.space());
     if (received.status == IoStatus::kEmpty) return true;
@@ -65,7 +73,7 @@ bool RtdeSession::handle(const rtde::Frame& frame) {
     case PackageType::kProtocolVersion:
       return handle_protocol(frame.payload);
     case PackageType::kControllerVersion:
-      return send(rtde::encode_controller_version(shared_.version));
+      return reply(rtde::encode_controller_version(shared_.version));
     case PackageType::kText:
       return rtde::decode_text(frame.payload) ? true : complain("The text message could not be parsed");
     case PackageType::kData:
@@ -78,7 +86,7 @@ bool RtdeSession::handle(const rtde::Frame& frame) {
       return handle_start();
     case PackageType::kPause:
       streaming_ = false;
-      return send(rtde::encode_accepted(PackageType::kPause, true));
+      return reply(rtde::encode_accepted(PackageType::kPause, true));
   }
   return complain("Unknown package type " + std::to_string(frame.type));
 }
@@ -87,7 +95,7 @@ bool RtdeSession::handle_protocol(rtde::Bytes payload) {
   const auto version = rtde::decode_protocol_request(payload);
   const bool accepted = version && (*version == 1 || *version == 2) && !streaming_;
   if (accepted) version_ = *version;
-  return send(rtde::encode_accepted(PackageType::kProtocolVersion, accepted));
+  return reply(rtde::encode_accepted(PackageType::kProtocolVersion, accepted));
 }
 
 bool RtdeSession::handle_outputs(rtde::Bytes payload) {
@@ -111,7 +119,7 @@ bool RtdeSession::handle_outputs(rtde::Bytes payload) {
 bool RtdeSession::handle_inputs(rtde::Bytes payload) {
   if (streaming_ || inputs_.size() == kMaxInputRecipes) {
     return complain(streaming_ ? "Pause before setting up inputs" : "Too many input recipes") &&
-           send(rtde::encode_setup_reply(PackageType::kSetupInputs, {}));
+           reply(rtde::encode_setup_reply(PackageType::kSetupInputs, {}));
   }
   Resolved resolved = resolve(rtde::as_text(payload), true);
   std::uint8_t id = 0;
@@ -120,12 +128,12 @@ bool RtdeSession::handle_inputs(rtde::Bytes payload) {
     for (const RtdeVariables::Index index : resolved.recipe.variables) shared_.owners[index] = id_;
     inputs_.push_back(std::move(resolved.recipe));
   }
-  return send(rtde::encode_setup_reply(PackageType::kSetupInputs, {id, resolved.types}));
+  return reply(rtde::encode_setup_reply(PackageType::kSetupInputs, {id, resolved.types}));
 }
 
 bool RtdeSession::handle_start() {
   streaming_ = outputs_.id != 0;
-  return send(rtde::encode_accepted(PackageType::kStart, streaming_));
+  return reply(rtde::encode_accepted(PackageType::kStart, streaming_));
 }
 
 bool RtdeSession::handle_data(rtde::Bytes payload) {
@@ -154,7 +162,7 @@ RtdeSession::Resolved RtdeSession::resolve(std::string_view names, bool inputs) 
   std::string_view name;
   while (rtde::next_token(names, name) && resolved.recipe.variables.size() < kMaxRecipeVariables) {
     const auto index = shared_.variables.find(name);
-    const std::string_view problem = check_variable(index, inputs);
+    const std::string_view problem = check_variable(name, index, inputs);
     if (!resolved.types.empty()) resolved.types += ',';
     resolved.types += problem.empty() ? rtde::type_name(shared_.variables.type(*index)) : problem;
     resolved.valid = resolved.valid && problem.empty();
@@ -165,16 +173,18 @@ RtdeSession::Resolved RtdeSession::resolve(std::string_view names, bool inputs) 
   return resolved;
 }
 
-std::string_view RtdeSession::check_variable(std::optional<RtdeVariables::Index> index, bool inputs) const {
-  const bool known = index && (inputs ? shared_.variables.writable(*index) : shared_.variables.readable(*index));
+std::string_view RtdeSession::check_variable(std::string_view name, std::optional<RtdeVariables::Index> index,
+                                             bool inputs) const {
+  const bool known = index && !shared_.missing.contains(name) &&
+                     (inputs ? shared_.variables.writable(*index) : shared_.variables.readable(*index));
   if (!known) return "NOT_FOUND";
-  const bool free = !inputs || shared_.owners[*index] == 0 || shared_.owners[*index] == id_;
-  return free ? "" : "IN_USE";
+  const bool mine = shared_.owners[*index] == 0 || shared_.owners[*index] == id_;
+  return !inputs || (mine && shared_.now >= shared_.in_use_until) ? "" : "IN_USE";
 }
 
 bool RtdeSession::reply_outputs(std::uint8_t id, std::string_view types) {
-  if (version_ == 1) return send(rtde::encode_outputs_reply_v1(types));
-  return send(rtde::encode_setup_reply(PackageType::kSetupOutputs, {id, types}));
+  if (version_ == 1) return reply(rtde::encode_outputs_reply_v1(types));
+  return reply(rtde::encode_setup_reply(PackageType::kSetupOutputs, {id, types}));
 }
 
 void RtdeSession::count_sequence(std::uint32_t sequence) noexcept {
@@ -197,9 +207,14 @@ bool RtdeSession::complain(std::string_view message) {
   return send(version_ == 1 ? rtde::encode_text_v1(text) : rtde::encode_text(text));
 }
 
+bool RtdeSession::reply(rtde::Bytes package) {
+  if (!shared_.texts_in_handshake) return send(package);
+  const rtde::Text text{"Arm is not powered", "Controller", static_cast<std::uint8_t>(rtde::TextLevel::kInfo)};
+  return send(version_ == 1 ? rtde::encode_text_v1(text) : rtde::encode_text(text)) && send(package);
+}
+
 bool RtdeSession::send(rtde::Bytes package) {
-  const IoStatus status = transport::send_message(fd_.get(), package);
-  if (status == IoStatus::kDone) return true;
+  if (outbox_.send(fd_.get(), package, shared_.link, shared_.now)) return true;
   // A full buffer, or a package that fits it in part only: the client does not keep up, and is dropped.
   ++shared_.counters.slow_clients_closed;
   return false;

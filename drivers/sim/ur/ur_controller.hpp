@@ -1,31 +1,23 @@
 #pragma once
-// A simulated UR10e controller that speaks RTDE on a TCP port: one thread, one clock, real bytes.
+// A simulated UR controller that speaks RTDE, the ports 30001 to 30003 and the dashboard over TCP: one thread, one
+// clock, real bytes. A fresh one runs, with our control program playing.
 #include <atomic>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <thread>
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "drivers/sim/ur/controller_config.hpp"
+#include "drivers/sim/ur/controller_faults.hpp"
 #include "drivers/sim/ur/rtde_counters.hpp"
-#include "drivers/sim/ur/ur_robot.hpp"
 
 namespace embody::sim {
-
-struct UrControllerConfig {
-  std::string address{"127.0.0.1"};
-  std::uint16_t port{0};             ///< 0 takes a free one
-  double frequency_hz{500.0};        ///< control cycles per second, 1 to 1000
-  UrRobotConfig robot;               ///< q_start_rad, limits, lag
-  std::size_t log_capacity{30'000};  ///< newest samples kept, one per control cycle
-  std::size_t max_clients{8};
-};
 
 /// The robot after one control cycle.
 struct UrSample {
   TimePoint t{};                                    ///< planned time of the cycle
-  std::uint64_t cycle{0};                           ///< timestamp = cycle / frequency_hz
+  std::uint64_t cycle{0};                           ///< timestamp = cycle / frequency_hz, since start or RTDE restart
   Vector6 q_rad{Vector6::Zero()};                   ///< actual
   Vector6 qd_rad_s{Vector6::Zero()};                ///< actual
   Vector6 q_target_rad{Vector6::Zero()};            ///< set-point of the control program
@@ -37,7 +29,7 @@ struct UrCounters : RtdeCounters {
   std::uint64_t late_cycles{0};  ///< cycles that the host missed: stepped later, never sent
 };
 
-/// The functions after port() may be called from any thread; a fault takes effect in the next control cycle.
+/// The functions after port() may be called from any thread; a fault takes effect before the next control cycle.
 class UrController {
  public:
   explicit UrController(UrControllerConfig config);
@@ -51,7 +43,11 @@ class UrController {
   /// Ends the thread and closes all connections. start() begins anew.
   void stop() noexcept;
   /// 0 before start().
-  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
+  [[nodiscard]] std::uint16_t port() const noexcept { return ports_[0]; }
+  [[nodiscard]] std::uint16_t primary_port() const noexcept { return ports_[1]; }
+  [[nodiscard]] std::uint16_t secondary_port() const noexcept { return ports_[2]; }
+  [[nodiscard]] std::uint16_t realtime_port() const noexcept { return ports_[3]; }
+  [[nodiscard]] std::uint16_t dashboard_port() const noexcept { return ports_[4]; }
 
   /// A client streams and has sent at least one input package.
   [[nodiscard]] bool has_client() const noexcept { return has_client_; }
@@ -60,32 +56,38 @@ class UrController {
   [[nodiscard]] UrSample latest() const;
   /// Everything in the log, oldest first.
   [[nodiscard]] std::vector<UrSample> samples() const;
+  /// Modes after the newest cycle.
+  [[nodiscard]] SafetyStatus safety() const;
 
-  void protective_stop() noexcept;
-  void emergency_stop() noexcept;
+  /// A fault by name (controller_faults.hpp), with or without "ur " in front. Errors: kInvalidArgument.
+  Status fault(std::string_view text);
+
+  void protective_stop() { post("protective-stop"); }
+  void emergency_stop() { post("emergency-stop"); }
   /// Ends a stop, powers the arm and restarts the program, which has to be armed again.
-  void clear_stop() noexcept;
-  void set_program_running(bool running) noexcept;
+  void clear_stop() { post("clear-stop"); }
+  void set_program_running(bool running) { post(running ? "program on" : "program off"); }
   /// Like a pulled cable: nothing is sent or read, the sockets stay open, the robot goes on by itself.
-  void freeze(bool frozen) noexcept { frozen_ = frozen; }
-  /// Closes all connections; the port stays open.
-  void disconnect_clients() noexcept;
+  void freeze(bool frozen) { post(frozen ? "freeze on" : "freeze off"); }
+  /// Closes all RTDE connections; the port stays open.
+  void disconnect_clients() { post("disconnect"); }
 
  private:
-  class Loop;
+  void post(std::string_view fault);
   void run(const std::stop_token& stop);
+  void apply_faults();
   void log(TimePoint t, std::uint64_t cycle);
 
   UrControllerConfig config_;
-  std::unique_ptr<Loop> loop_;
-  std::uint16_t port_{0};
+  std::unique_ptr<ControllerLoop> loop_;
+  std::array<std::uint16_t, 5> ports_{};
   std::atomic<bool> has_client_{false};
-  std::atomic<bool> frozen_{false};
-  std::atomic<unsigned> requests_{0};
   mutable std::mutex mutex_;  // of what follows; held for a few microseconds, longer only while the log is copied
+  std::vector<FaultAction> faults_;
   std::vector<UrSample> log_;
   std::size_t logged_{0};
   UrCounters counters_;
+  SafetyStatus safety_;
   std::jthread thread_;
 };
 

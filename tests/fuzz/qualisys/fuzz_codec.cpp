@@ -1,9 +1,10 @@
-// Any byte stream, in chunks chosen by its first bytes: every packet that comes out decodes or is refused, and data
-// that decodes survives encoding.
+// Any byte stream in either byte order, in chunks chosen by its first byte: every packet that comes out decodes or is
+// refused, and what decodes is sound; markers survive encoding.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 
+#include "core/math/pose.hpp"
 #include "drivers/qualisys/codec.hpp"
 #include "drivers/qualisys/stream_reassembler.hpp"
 
@@ -11,16 +12,32 @@ namespace {
 
 using namespace embody::qualisys;
 
-void check_data(std::span<const std::byte> packet) {
-  DataPacket data;
-  if (!decode_data(packet, data)) return;
+void check_markers(const DataPacket& data) {
   constexpr Component kComponents[] = {Component::k3d};
   DataPacket again;
   if (!decode_data(encode_data(data, kComponents), again)) std::abort();
   if (again.markers.size() != data.markers.size() || again.timestamp_us != data.timestamp_us) std::abort();
   for (std::size_t i = 0; i < data.markers.size(); ++i) {
-    if (data.markers[i].visible && !data.markers[i].p_W.allFinite()) std::abort();
-    if (data.markers[i].visible != again.markers[i].visible) std::abort();
+    const auto& marker = data.markers[i];
+    if (marker.visible && !marker.p_W.allFinite()) std::abort();
+    if (!(marker.confidence >= 0.0F && marker.confidence <= 1.0F)) std::abort();
+    if (marker.visible != again.markers[i].visible) std::abort();
+  }
+}
+
+void check_data(std::span<const std::byte> packet, ByteOrder order) {
+  DataPacket data;
+  if (const auto status = decode_data(packet, data, order); !status) {
+    if (status.error().detail.empty()) std::abort();
+    return;
+  }
+  if (data.markers.size() > kMaxDataMarkers || data.bodies.size() > kMaxDataBodies) std::abort();
+  check_markers(data);
+  for (const auto& body : data.bodies) {
+    if (!body.visible) continue;
+    const Eigen::Matrix3d R = body.X_W.linear();
+    if (!((R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().sum() < 1e-9)) std::abort();
+    if (!body.X_W.translation().allFinite() || !(body.residual_m >= 0.0) || R.determinant() < 0.0) std::abort();
   }
 }
 
@@ -28,10 +45,11 @@ void check_data(std::span<const std::byte> packet) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  const std::size_t chunk = 1 + data[0];
+  const auto order = (data[0] & 1) != 0 ? ByteOrder::kBig : ByteOrder::kLittle;
+  const std::size_t chunk = 1 + data[0] / 2;
   auto rest = std::as_bytes(std::span(data + 1, size - 1));
-  check_data(rest);
-  StreamReassembler reassembler(8192);
+  check_data(rest, order);
+  StreamReassembler reassembler(8192, order);
   while (!rest.empty()) {
     const auto space = reassembler.free_space();
     if (space.empty()) std::abort();
@@ -43,9 +61,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const auto packet = reassembler.next();
       if (!packet) return 0;
       if (packet->empty()) break;
-      (void)decode_text(*packet);
-      (void)decode_event(*packet);
-      check_data(*packet);
+      (void)decode_text(*packet, order);
+      (void)decode_event(*packet, order);
+      check_data(*packet, order);
     }
   }
   return 0;

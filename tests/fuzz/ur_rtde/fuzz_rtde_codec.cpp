@@ -25,6 +25,9 @@ void decode(const rtde::Frame& frame) {
   if (const auto reply = rtde::decode_setup_reply(payload)) {
     if (rtde::check_setup_reply(rtde::kInputRecipe, *reply)) check(reply->recipe != 0);
   }
+  rtde::OutputRecipe recipe;
+  (void)recipe.drop_unknown(rtde::as_text(payload));
+  check(recipe.size() >= rtde::fields_size(rtde::kOutputRecipe));
   ArmState state;
   const std::size_t size = rtde::fields_size(rtde::kOutputRecipe);
   const rtde::Bytes fields = payload.first(std::min(size, payload.size()));

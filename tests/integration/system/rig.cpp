@@ -64,13 +64,16 @@ std::string TemporaryFolder::read(const std::string& name) const {
 Rig::Rig(const RigOptions& options) {
   const std::string recording =
       options.recording.empty() ? std::string(EMBODY_SOURCE_DIR) + "/config/recordings/demo.tsv" : options.recording;
-  const auto config = [&](int qtm, int ur) {
-    return "schema = 1\n[tracker]\nport = " + std::to_string(qtm) + "\n[arm]\nport = " + std::to_string(ur) +
-           "\n[arm.limits]\nspeed_m_s = 0.6\nspeed_rad_s = 2.5\n[hand]\ndevice = \"" + folder.file("mia") +
-           "\"\n[safety]\nhold_after_ms = 100\n[control]\nsocket = \"" + folder.file("control.sock") +
-           "\"\n[dds]\nenabled = false\n" + options.extra_config;
+  const auto config = [&](const json& ready) {
+    const auto port = [&ready](const char* name) { return std::to_string(ready.value(name, 1)); };
+    return "schema = 1\n[tracker]\nport = " + port("qtm_port") + "\n[arm]\nport = " + port("ur_port") +
+           "\ndashboard_port = " + port("ur_dashboard_port") +
+           "\nstale_after_ms = 500\n[arm.program]\nport = " + port("ur_primary_port") +
+           "\nwatchdog_hz = 2.0\n[arm.limits]\nspeed_m_s = 0.6\nspeed_rad_s = 2.5\n[hand]\ndevice = \"" +
+           folder.file("mia") + "\"\n[safety]\nhold_after_ms = 100\n[control]\nsocket = \"" +
+           folder.file("control.sock") + "\"\n[dds]\nenabled = false\n" + options.extra_config;
   };
-  folder.write("embody.toml", config(1, 1));
+  folder.write("embody.toml", config(json::object()));
   std::vector<std::string> arguments{"run",        recording,         "--wait", "--config", folder.file("embody.toml"),
                                      "--mia-link", folder.file("mia")};
   if (options.duration_s > 0.0) arguments.insert(arguments.end(), {"--duration", std::to_string(options.duration_s)});
@@ -79,7 +82,7 @@ Rig::Rig(const RigOptions& options) {
   if (!lab) return;
   lab_.emplace(std::move(*lab));
   const json ready = wait_event("ready");
-  folder.write("embody.toml", config(ready.value("qtm_port", 0), ready.value("ur_port", 0)));
+  folder.write("embody.toml", config(ready));
   if (options.start_daemon) start_daemon();
 }
 

@@ -77,7 +77,7 @@ TEST(MiaCommands, WithoutArgumentsAreToldApart) {
   EXPECT_EQ(parse_command(encode_plain("ADjo")).kind, Kind::kRead);
   EXPECT_TRUE(parse_command(encode_plain("ADS1")).on);
   EXPECT_FALSE(parse_command(encode_plain("ADS0")).on);
-  for (const char* unknown : {"", "ASx", "ADPx", "ADJ1", "AD", "4P+010040", "1P 010040", "1P+01x040", "2F+....5080",
+  for (const char* unknown : {"", "ASx", "ADPx", "ADJ1", "AD", "4P+010040", "1P 010040", "1P+01x040", "2Fx....5080",
                               "MiaHandCommand", "J", "JP", "JxP+10050"}) {
     EXPECT_EQ(parse_command(encode_plain(unknown)).kind, Kind::kUnknown) << unknown;
   }

@@ -62,16 +62,19 @@ TEST(MiaHand, StopIsSentFourTimesAndThenAsZeroSpeedBeforeTheSessionIsGivenUp) {
   EXPECT_EQ(rig.simulator.counters().commands - before, 7u) << "four stops, three zero speeds";
 }
 
-TEST(MiaHand, LostAckIsCountedAndTheTargetSentAgain) {
+TEST(MiaHand, LostAckIsCountedAndTheCommandSentOnceMoreInTheSameCycle) {
   MiaRig rig(quick_config());
   ASSERT_TRUE(rig.cycle(MiaRig::plain(HandAction::kHold)));
   const mia::MiaCounters before = rig.hand->counters();
-  rig.simulator.drop_next(1);
+  const std::uint64_t motions = rig.simulator.counters().motions;
+  ASSERT_TRUE(rig.simulator.fault("drop_ack 1").ok());
   ASSERT_TRUE(rig.cycle(MiaRig::move(0.0, 0.0, 0.8)));
   EXPECT_GE(rig.hand->counters().timeouts, before.timeouts + 1);
-  const std::uint64_t motions = rig.simulator.counters().motions;
+  EXPECT_GE(rig.hand->counters().retries, before.retries + 1);
+  EXPECT_GE(rig.simulator.counters().motions, motions + 4) << "three motors, one of them twice";
+  const std::uint64_t told = rig.simulator.counters().motions;
   ASSERT_TRUE(rig.cycle(MiaRig::move(0.0, 0.0, 0.8)));
-  EXPECT_GE(rig.simulator.counters().motions, motions + 1) << "the motor that did not answer is told again";
+  EXPECT_EQ(rig.simulator.counters().motions, told) << "all have heard it";
 }
 
 TEST(MiaHand, TargetWhoseAckWasLostIsTakenBackByTheNextOne) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace embody::mia {
 namespace {
@@ -36,6 +37,71 @@ TEST(MiaTransmission, IndexMapAgreesWithTheVendorsWithinAThousandthOfARadian) {
   const IndexTransmission index;
   for (int counts = -kMaxCounts; counts <= kMaxCounts; ++counts) {
     EXPECT_NEAR(index_delta_rad(index, counts), vendor_delta_rad(counts), 1.0e-3) << counts << " counts";
+  }
+}
+
+/// The vendor's inverse: signed flexion -> crank angle -> motor counts.
+double vendor_counts(double delta_rad) {
+  struct Piece {
+    double upper, slope, offset;
+  };
+  static constexpr std::array<Piece, 15> kPieces{{{-1.07, -.917583, .918828},
+                                                  {-.70, -1.053913, .773465},
+                                                  {-.38, -1.194334, .675796},
+                                                  {-.17, -1.431898, .586185},
+                                                  {-.05, -1.964169, .496913},
+                                                  {-.01, -3.386105, .424335},
+                                                  {0.0, -10.977376, .351597},
+                                                  {.01, -8.898456, .342954},
+                                                  {.05, -2.867630, .283966},
+                                                  {.15, -1.477873, .217013},
+                                                  {.33, -.974113, .141950},
+                                                  {.80, -.813805, .090328},
+                                                  {1.16, -.978064, .222664},
+                                                  {1.33, -1.239413, .525808},
+                                                  {1.5, -1.429410, .778435}}};
+  const Piece* piece = &kPieces.back();
+  for (const Piece& candidate : kPieces) {
+    if (delta_rad > candidate.upper) continue;
+    piece = &candidate;
+    break;
+  }
+  return std::round(-0.1153 * 1280.0 * (piece->slope * delta_rad + piece->offset) + 66.9697);
+}
+
+TEST(MiaTransmission, SamplesOfTheVendorsIndexMapAgreeInBothDirections) {
+  const std::array<std::pair<int, double>, 13> samples{{{-255, -1.376},
+                                                        {-200, -.982},
+                                                        {-150, -.664},
+                                                        {-100, -.383},
+                                                        {-50, -.155},
+                                                        {0, -.019},
+                                                        {15, .0015},
+                                                        {30, .022},
+                                                        {50, .070},
+                                                        {100, .388},
+                                                        {150, .800},
+                                                        {200, 1.145},
+                                                        {255, 1.436}}};
+  const IndexTransmission index;
+  for (const auto& [counts, delta_rad] : samples) {
+    EXPECT_NEAR(index_delta_rad(index, counts), delta_rad, 1.6e-3) << counts << " counts";
+    EXPECT_NEAR(vendor_delta_rad(counts), delta_rad, 1e-3) << counts << " counts: the reference itself";
+    // In the dead zone a thousandth of a radian is most of a count.
+    EXPECT_NEAR(index_counts(index, delta_rad), counts, counts > -20 && counts < 42 ? 1.5 : 0.7) << delta_rad;
+  }
+  EXPECT_EQ(vendor_counts(0.0), 15.0);
+  EXPECT_EQ(vendor_counts(1.4), 247.0);
+  EXPECT_EQ(vendor_counts(-1.4), -258.0);
+}
+
+TEST(MiaTransmission, InverseAgreesWithTheVendorsWithinItsOwnError) {
+  const IndexTransmission index;
+  for (double delta_rad = -1.37; delta_rad <= 1.43; delta_rad += 0.001) {
+    const double counts = index_counts(index, delta_rad);
+    const bool dead_zone = counts > -19.0 && counts < 42.0;  // the vendor's two maps are 8 counts apart there
+    const double tolerance = dead_zone ? 8.5 : 2.8;
+    ASSERT_NEAR(counts, vendor_counts(delta_rad), tolerance) << delta_rad << " rad";
   }
 }
 

@@ -116,7 +116,7 @@ TEST(QualisysCodec, SkipsComponentsThatItDoesNotKnow) {
 
 TEST(QualisysCodec, ReportsNoMarkersWhenNo3dComponentIsPresent) {
   auto bytes = documented_packet();
-  store_u32(bytes, 28, 5);  // a 6D component of the same size
+  store_u32(bytes, 28, 17);  // a time code of the same size
   DataPacket data;
   data.has_markers = true;
   ASSERT_TRUE(decode_data(bytes, data).ok());

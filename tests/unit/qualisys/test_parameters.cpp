@@ -97,5 +97,66 @@ TEST(QualisysParameters, RefusesEveryTruncation) {
   EXPECT_TRUE(parse_parameters(xml).ok());
 }
 
+std::string section_6d(const std::string& bodies) {
+  return "<The_6D>\r\n" + bodies + "</The_6D>\r\n";
+}
+
+std::string body(const std::string& name, const std::string& more = "") {
+  return "<Body>\r\n<Name>" + name + "</Name>\r\n" + more + "</Body>\r\n";
+}
+
+TEST(QualisysParameters, ReadsBodiesInOrderSince1Dot21) {
+  const auto parameters = parse_parameters(
+      document(section_3d("0", "") +
+               section_6d(body(" hand ",
+                               "<Enabled>true</Enabled><Points><Point X=\"0.0\" Name=\"hand - 1\"/></Points>"
+                               "<Data_origin X=\"0\" Relative_body=\"1\">0</Data_origin>"
+                               "<Data_orientation R11=\"1\">0</Data_orientation>") +
+                          body("table", "<Enabled>false</Enabled><Data_origin>1</Data_origin>"))));
+  ASSERT_TRUE(parameters.ok()) << parameters.error().detail.c_str();
+  EXPECT_EQ(parameters->bodies, (std::vector<BodyParameters>{{"hand", true, false}, {"table", false, true}}));
+}
+
+TEST(QualisysParameters, ReadsBodiesAsBefore1Dot21) {
+  const std::string points = "<RGBColor>65280</RGBColor><Point><X>0.0</X><Y>0.0</Y><Z>0.0</Z></Point>";
+  const auto parameters = parse_parameters(
+      document(section_3d("0", "") + section_6d("<Bodies>2</Bodies>\r\n" + body("hand", points) + body("table") +
+                                                "<Euler><First>Pitch</First></Euler>")));
+  ASSERT_TRUE(parameters.ok()) << parameters.error().detail.c_str();
+  EXPECT_EQ(parameters->bodies, (std::vector<BodyParameters>{{"hand", true, false}, {"table", true, false}}));
+  EXPECT_TRUE(parse_parameters(document(section_3d("0", "") + section_6d("<Bodies>0</Bodies>"))).ok());
+}
+
+TEST(QualisysParameters, RefusesBodiesThatAreNotUsable) {
+  std::string many;
+  for (std::size_t i = 0; i <= kMaxDataBodies; ++i) many += body("b" + std::to_string(i));
+  for (const auto& bodies : {body("hand") + body("hand"), body(""), body(std::string(kMaxNameLength + 1, 'x')), many,
+                             "<Bodies>2</Bodies>" + body("hand"), "<Bodies>x</Bodies>" + body("hand")}) {
+    const auto parameters = parse_parameters(document(section_3d("0", "") + section_6d(bodies)));
+    ASSERT_FALSE(parameters.ok()) << bodies;
+    EXPECT_FALSE(parameters.error().detail.empty());
+  }
+}
+
+TEST(QualisysParameters, ReadsWhatIsDoneWithEachFrame) {
+  struct Case {
+    const char* actions;
+    RealTimeProcessing processing;
+  };
+  for (const auto& [actions, processing] :
+       {Case{"", {true, true, true}}, Case{"<RealTime_Processing_Actions/>", {true, true, true}},
+        Case{"<RealTime_Processing_Actions><Tracking>3D</Tracking><AIM>true</AIM><Track6DOF>false</Track6DOF>"
+             "</RealTime_Processing_Actions>",
+             {true, true, false}},
+        Case{"<Processing_Actions><AIM>false</AIM></Processing_Actions><RealTime_Processing_Actions>"
+             "<Tracking>2D</Tracking><AIM>false</AIM></RealTime_Processing_Actions>",
+             {false, false, true}}}) {
+    const auto parameters = parse_parameters(
+        document("<General><Frequency>100</Frequency>" + std::string(actions) + "</General>" + section_3d("0", "")));
+    ASSERT_TRUE(parameters.ok()) << actions;
+    EXPECT_EQ(parameters->processing, processing) << actions;
+  }
+}
+
 }  // namespace
 }  // namespace embody::qualisys

@@ -118,8 +118,8 @@ TEST(QtmServer, AnswersCommandsInAnyCaseAndWithOrWithoutTerminator) {
   ASSERT_TRUE(transport::send_all(connection.fd(), bare, soon()).ok());
   EXPECT_TRUE(qualisys::decode_text(next_packet(connection))->starts_with("QTM Version is "));
   for (const char* unknown :
-       {"Fly", "", "StreamFrames", "StreamFrames AllFrames", "StreamFrames AllFrames 6D", "StreamFrames Frequency:0 3D",
-        "StreamFrames AllFrames UDP:3000 3D", "GetParameters", "GetParameters 5D", "GetCurrentFrame"}) {
+       {"Fly", "", "StreamFrames", "StreamFrames AllFrames", "StreamFrames AllFrames 7D", "StreamFrames Frequency:0 3D",
+        "StreamFrames AllFrames UDP:1000 3D", "GetParameters", "GetParameters 5D", "GetCurrentFrame"}) {
     const auto reply = connection.ask(unknown, PacketType::kCommand, soon());
     ASSERT_FALSE(reply.ok()) << unknown;
     EXPECT_NE(reply.error().detail.view().find("Parse error"), std::string_view::npos) << unknown;
@@ -377,7 +377,7 @@ TEST(QtmServer, DropsAClientThatDoesNotReadAndGoesOnServingTheOthers) {
 }
 
 TEST(QtmServer, RefusesToServeAnEmptyRecordingOrATakenPort) {
-  QtmServer empty({}, {});
+  QtmServer empty({}, recording::Recording{});
   EXPECT_EQ(empty.start().error().code, Errc::kInvalidArgument);
   const Lab lab;
   QtmServerConfig config;

@@ -74,7 +74,7 @@ TEST(QualisysTracker, DeliversEveryFrameInOrderWithPositionsBySlotAndMissingMark
     MarkerFrame frame;
     ASSERT_EQ(next_frame(*lab.tracker, fd, frame), IoStatus::kDone) << k;
     expect_frame(frame, lab.recording, k);
-    EXPECT_EQ(frame.label_epoch, 1U);
+    EXPECT_EQ(frame.label_epoch, 2U) << "one for the session, one for the start of the capture";
     frames.push_back(frame);
   }
   const auto log = lab.server.log();
@@ -96,7 +96,7 @@ TEST(QualisysTracker, MapsTheSensorClockWithTheSpacingOfTheSensorWhateverTheArri
     MarkerFrame frame;
     ASSERT_EQ(next_frame(*lab.tracker, fd, frame), IoStatus::kDone);
     const auto sensor_time = std::chrono::milliseconds(k);
-    EXPECT_LE(frame.t_capture, first.t_capture + sensor_time + std::chrono::microseconds(50)) << "frame " << k;
+    EXPECT_LE(frame.t_capture, first.t_capture + sensor_time + std::chrono::microseconds(100)) << "frame " << k;
     EXPECT_GE(frame.t_capture, t_before_play + sensor_time) << "not before its exposure, frame " << k;
   }
 }
@@ -196,7 +196,7 @@ TEST(QualisysTracker, ReportsALostServerAndConnectsAgain) {
   const auto again = lab.tracker->connect();
   ASSERT_TRUE(again.ok()) << again.error().detail.c_str();
   ASSERT_EQ(next_frame(*lab.tracker, again->fd, frame), IoStatus::kDone);
-  EXPECT_EQ(frame.label_epoch, 2U);
+  EXPECT_EQ(frame.label_epoch, 3U) << "another session";
   expect_frame(frame, lab.recording, frame.frame_number - 1);
 }
 

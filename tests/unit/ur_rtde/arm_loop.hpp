@@ -13,15 +13,24 @@ inline constexpr Duration kPatience = std::chrono::seconds(5);
 /// An arm driver with the loop that a daemon would run around it: one command per package.
 class ArmLoop {
  public:
-  explicit ArmLoop(std::uint16_t port, Duration in_use_patience = std::chrono::seconds(4)) {
+  explicit ArmLoop(const UrRtdeConfig& config) : arm(std::make_unique<UrRtdeArm>(config)) { connect(); }
+  explicit ArmLoop(std::uint16_t port, Duration in_use_patience = std::chrono::seconds(4))
+      : ArmLoop(without_upload(port, in_use_patience)) {}
+
+  static UrRtdeConfig without_upload(std::uint16_t port, Duration in_use_patience) {
     UrRtdeConfig config;
     config.port = port;
     config.in_use_patience = in_use_patience;
-    arm = std::make_unique<UrRtdeArm>(config);
+    config.upload = false;
+    config.stale_after = kPatience;  // a busy host must not end the sessions of other tests
+    return config;
+  }
+  bool connect() {
     const auto info = arm->connect();
     connected = info.ok();
-    if (info) fd = info->fd;
+    fd = info ? info->fd : -1;
     if (!info) error = info.error();
+    return connected;
   }
   /// Waits for the next package; false when the session is over or nothing comes.
   bool next() {

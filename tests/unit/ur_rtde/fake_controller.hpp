@@ -15,7 +15,7 @@ using ReplyBytes = std::vector<std::byte>;
 
 /// One data package of the arm driver's recipe: running, normal, program playing, joint angles all `q_rad`.
 inline ReplyBytes state_package(double timestamp_s, double q_rad = 0.0) {
-  ReplyBytes package(rtde::kFieldsStart + rtde::fields_size(rtde::kOutputRecipe));
+  ReplyBytes package(rtde::kFieldsStart + rtde::OutputRecipe().size());
   rtde::begin_data(package, 1);
   rtde::store(package, 4, timestamp_s);
   for (std::size_t i = 0; i < 6; ++i) rtde::store(package, 12 + 8 * i, q_rad);
@@ -27,7 +27,7 @@ inline ReplyBytes state_package(double timestamp_s, double q_rad = 0.0) {
 
 /// What a healthy controller answers to a request of the given type.
 inline ReplyBytes healthy_reply(char type) {
-  const auto types = [](auto& recipe) {
+  const auto types = [](std::span<const rtde::Variable> recipe) {
     std::string text;
     for (const rtde::Variable& variable : recipe) text += std::string(rtde::type_name(variable.type)) + ',';
     text.pop_back();
@@ -39,7 +39,7 @@ inline ReplyBytes healthy_reply(char type) {
     case 'v':
       return rtde::encode_controller_version({5, 12, 4, 0});
     case 'O':
-      return rtde::encode_setup_reply(rtde::PackageType::kSetupOutputs, {1, types(rtde::kOutputRecipe)});
+      return rtde::encode_setup_reply(rtde::PackageType::kSetupOutputs, {1, types(rtde::OutputRecipe().variables())});
     case 'I':
       return rtde::encode_setup_reply(rtde::PackageType::kSetupInputs, {1, types(rtde::kInputRecipe)});
     case 'S':

@@ -91,10 +91,38 @@ TEST(UrRtdeArmSetUp, ToleratesTextsStaleDataAndAnyFragmentation) {
   }
 }
 
+/// What a controller sends during one session, set-up and stream, cut once at each byte.
+TEST(UrRtdeArmStream, ASessionIsUnderstoodWhereverItIsCut) {
+  using test::operator+;
+  test::ReplyBytes session = test::hex("00 09 4d 02 'hi' 01 'd' 03");
+  for (const char type : {'V', 'v', 'O', 'I', 'S'}) session = session + test::healthy_reply(type);
+  for (int i = 1; i <= 3; ++i) session = session + test::state_package(2.0 + 0.002 * i);
+  const std::string types = "MVvOISUUU";
+  rtde::FrameBuffer buffer;
+  for (std::size_t cut = 0; cut <= session.size(); ++cut) {
+    buffer.clear();
+    std::string seen;
+    for (const auto& part : {rtde::Bytes(session).first(cut), rtde::Bytes(session).subspan(cut)}) {
+      std::copy(part.begin(), part.end(), buffer.space().begin());
+      buffer.commit(part.size());
+      for (auto parsed = buffer.next(); parsed.framing == rtde::Framing::kComplete; parsed = buffer.next()) {
+        seen += static_cast<char>(parsed.frame.type);
+        if (!parsed.frame.is(rtde::PackageType::kData)) continue;
+        const auto fields = rtde::decode_data(parsed.frame.payload, 1, rtde::OutputRecipe().size());
+        ArmState state;
+        ASSERT_TRUE(fields && rtde::decode_state(*fields, state)) << cut;
+        ASSERT_EQ(state.condition, ArmCondition::kReady);
+      }
+    }
+    ASSERT_EQ(seen, types) << "cut at " << cut;
+  }
+}
+
 TEST(UrRtdeArmStream, BytesThatBreakTheProtocolEndTheSession) {
   using test::operator+;
   const std::vector<test::ReplyBytes> endings{test::hex("00 02 55"), test::hex("00 05 55 01 00"),
-                                              test::state_package(std::nan("")), test::state_package(1.0, HUGE_VAL)};
+                                              test::state_package(std::nan("")), test::state_package(1.0, HUGE_VAL),
+                                              test::state_package(0.5)};  // the clock goes back
   for (const auto& ending : endings) {
     const test::FakeController fake([&](char type) {
       return type == 'S' ? test::healthy_reply(type) + test::state_package(1.0) + ending : test::healthy_reply(type);

@@ -1,0 +1,17 @@
+#pragma once
+// Faults of a simulated hand on CAN by their names (can_simulator.hpp).
+#include <optional>
+#include <string_view>
+
+#include "core/base/result.hpp"
+#include "drivers/sim/mia/can_compact_hand.hpp"
+#include "drivers/transport/can_errors.hpp"
+
+namespace embody::sim {
+
+/// "bus_off", "error_passive" or "no_ack" as what a controller reports, nothing for other texts.
+[[nodiscard]] std::optional<transport::CanErrors> bus_fault(std::string_view text) noexcept;
+/// Errors: kInvalidArgument, with the names that exist.
+Status compact_fault(CompactHand& hand, std::string_view text);
+
+}  // namespace embody::sim

@@ -1,0 +1,77 @@
+// `embodyctl arm` and `embodyctl discover` as people and programs call them, against simulated devices.
+#include "daemon/control/exit_code.hpp"
+#include "drivers/sim/ur/ur_controller.hpp"
+#include "tests/integration/system/rig.hpp"
+
+namespace embody::test {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A robot that is switched off, with quick brakes, and a configuration that names its dashboard.
+struct ArmLab {
+  explicit ArmLab(bool remote) : controller(config_of(remote)) {
+    EXPECT_TRUE(controller.start().ok());
+    folder.write("embody.toml", "schema = 1\n[arm]\ndashboard_port = " + std::to_string(controller.dashboard_port()) +
+                                    "\n[hand]\nfile = \"" EMBODY_SOURCE_DIR "/config/hands/mia.toml\"\n");
+  }
+  static sim::UrControllerConfig config_of(bool remote) {
+    sim::UrControllerConfig config;
+    config.powered = false;
+    config.remote = remote;
+    config.times.boot = config.times.power = config.times.brakes = milliseconds(100);
+    return config;
+  }
+  Finished arm(const std::string& action) {
+    return run_program("embodyctl", {"arm", action, "--config", folder.file("embody.toml"), "--json"}, 60);
+  }
+  json status() { return json::parse(arm("status").output, nullptr, false); }
+
+  TemporaryFolder folder;
+  sim::UrController controller;
+};
+
+TEST(ArmCommand, BringsTheRobotUpAndShowsItsModes) {
+  ArmLab lab(true);
+  EXPECT_EQ(lab.status()["robot_mode"], "power off");
+  const Finished up = lab.arm("bring-up");
+  EXPECT_EQ(up.exit_code, kExitOk) << up.output << up.errors;
+  const json running = lab.status();
+  EXPECT_EQ(running["robot_mode"], "running");
+  EXPECT_EQ(running["safety"], "normal");
+  EXPECT_EQ(running["remote_control"], true);
+  EXPECT_EQ(lab.arm("power-off").exit_code, kExitOk);
+}
+
+TEST(ArmCommand, IsRefusedInLocalControlAndForStopsThatAreTooFresh) {
+  ArmLab local(false);
+  const Finished refused = local.arm("power-on");
+  EXPECT_EQ(refused.exit_code, kExitRefused) << refused.output;
+  EXPECT_NE(refused.output.find("emote"), std::string::npos) << refused.output;
+
+  ArmLab lab(true);
+  ASSERT_EQ(lab.arm("bring-up").exit_code, kExitOk);
+  lab.controller.protective_stop();
+  const Finished early = lab.arm("unlock");
+  EXPECT_EQ(early.exit_code, kExitRefused) << early.output;
+  EXPECT_EQ(lab.status()["safety"], "protective stop") << "nothing is unlocked by itself";
+}
+
+TEST(ArmCommand, SaysThatNobodyAnswers) {
+  ArmLab lab(true);
+  lab.controller.stop();
+  const Finished gone = lab.arm("status");
+  EXPECT_EQ(gone.exit_code, kExitUnavailable) << gone.output << gone.errors;
+  EXPECT_FALSE(json::parse(gone.output, nullptr, false)["error"]["message"].get<std::string>().empty());
+}
+
+TEST(DiscoverCommand, AnswersWithAListAndTellsWhenItIsEmpty) {
+  const Finished found = run_program("embodyctl", {"discover", "--seconds", "0.2", "--json"}, 30);
+  const json list = json::parse(found.output, nullptr, false);
+  ASSERT_TRUE(list.is_array()) << found.output << found.errors;
+  EXPECT_EQ(found.exit_code, list.empty() ? kExitUnavailable : kExitOk);
+  EXPECT_EQ(run_program("embodyctl", {"discover", "--seconds", "1000"}, 30).exit_code, kExitUsage);
+}
+
+}  // namespace
+}  // namespace embody::test
