@@ -28,6 +28,8 @@ void add_evaluate_command(CLI::App& app, int& exit_code);
 void add_evaluate_hands_commands(CLI::App& evaluate, int& exit_code);
 /// convert: recordings to trajectories of a robot hand.
 void add_convert_command(CLI::App& app, int& exit_code);
+/// capture: the raw bytes between a driver and its device.
+void add_capture_command(CLI::App& app, int& exit_code);
 /// discover: QTM computers on the network.
 void add_discover_command(CLI::App& app, int& exit_code);
 /// arm: power, brakes and stops of the robot arm.

@@ -18,6 +18,7 @@ constexpr std::array kCommands{
     embody::ctl::Command{&embody::ctl::add_evaluate_command},
     embody::ctl::Command{&embody::ctl::add_convert_command},
     embody::ctl::Command{&embody::ctl::add_onboard_command},
+    embody::ctl::Command{&embody::ctl::add_capture_command},
     embody::ctl::Command{&embody::ctl::add_discover_command},
     embody::ctl::Command{&embody::ctl::add_arm_command},
 };
