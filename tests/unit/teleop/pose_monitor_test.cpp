@@ -39,6 +39,7 @@ class Stream {
     monitor_.step(pose);
     return pose;
   }
+  void restart() { monitor_.restart(); }
 
  private:
   PoseMonitor monitor_;
@@ -147,6 +148,21 @@ TEST(PoseMonitor, RefusesAPoseThatIsNotFiniteLater) {
   stream.step(kHere);
   for (int k = 0; k < 20; ++k) EXPECT_FALSE(stream.step({nan, 0.0, 0.0}).valid) << k;
   EXPECT_TRUE(stream.step(kHere).valid);
+}
+
+TEST(PoseMonitor, AfterARestartFiftyGoodPosesDoNotCountAndAJumpIsNoNews) {
+  Stream stream;
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(stream.step(kHere).valid);
+  stream.restart();
+  int waited = 0;
+  for (HandPose pose = stream.step(kElsewhere); !pose.valid; pose = stream.step(kElsewhere)) {
+    EXPECT_EQ(pose.streak, 0U);
+    EXPECT_EQ(pose.jumps, 0U) << "nothing was known that it could jump from";
+    ASSERT_LT(++waited, 100);
+    if (waited == 20) stream.step_invalid();  // does not count either
+  }
+  EXPECT_EQ(waited, 50);
+  EXPECT_EQ(stream.step(kElsewhere).streak, 2U) << "and a new streak has begun";
 }
 
 }  // namespace
