@@ -22,7 +22,7 @@ bool is_open(int master) {
 Status PtyProxy::open(const std::string& device) {
   auto line = transport::open_tty(device);
   if (!line) return line.error();
-  auto pty = open_pty();
+  auto pty = transport::open_pty();
   if (!pty) return pty.error();
   line_ = std::move(line->fd);
   pty_ = std::move(*pty);
@@ -79,7 +79,7 @@ void PtyProxy::end_of_driver() {
   writer_.closed(*connection_, End::kHost, false);
   connection_.reset();
   ::tcflush(pty_.master.get(), TCIOFLUSH);
-  make_raw(pty_.master.get());
+  transport::make_raw(pty_.master.get());
 }
 
 void PtyProxy::hang_up() {

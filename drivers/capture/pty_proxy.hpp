@@ -7,7 +7,7 @@
 #include "drivers/capture/capture_writer.hpp"
 #include "drivers/capture/pipe.hpp"
 #include "drivers/capture/poll_thread.hpp"
-#include "drivers/capture/pty.hpp"
+#include "drivers/transport/pty.hpp"
 
 namespace embody::capture {
 
@@ -41,7 +41,7 @@ class PtyProxy {
 
   CaptureWriter& writer_;
   transport::UniqueFd line_;
-  Pty pty_;
+  transport::Pty pty_;
   std::string device_;
   std::optional<std::uint32_t> connection_;
   std::optional<Pipe> out_;

@@ -32,7 +32,7 @@ Status ReplayDevice::start() {
   }
   if (capture_.chunks.empty()) return make_error(Errc::kInvalidArgument, "nothing to replay: the capture is empty");
   if (link == LinkKind::kSerial) {
-    auto pty = open_pty();
+    auto pty = transport::open_pty();
     if (!pty) return pty.error();
     pty_ = std::move(*pty);
     lines_.emplace_back(std::move(pty_.master), pty_.device, std::move(capture_.chunks), options_);

@@ -12,7 +12,7 @@
 #include "core/base/time.hpp"
 #include "drivers/capture/capture.hpp"
 #include "drivers/capture/poll_thread.hpp"
-#include "drivers/capture/pty.hpp"
+#include "drivers/transport/pty.hpp"
 
 namespace embody::capture {
 
@@ -86,7 +86,7 @@ class ReplayDevice {
 
   Capture capture_;
   ReplayOptions options_;
-  Pty pty_;
+  transport::Pty pty_;
   std::list<Port> ports_;
   std::mutex mutex_;  // of what follows, and the scripts
   std::list<Line> lines_;

@@ -152,7 +152,9 @@ Result<std::string> Dashboard::ask(std::string_view command) {
 Status Dashboard::connect(TimePoint deadline) {
   if (fd_) return {};
   auto fd = transport::tcp_connect(config_.host, config_.port, deadline);
-  if (!fd) return fd.error();
+  if (!fd) {
+    return make_error(fd.error().code, "no dashboard server: %s; is the controller on?", fd.error().detail.c_str());
+  }
   fd_ = std::move(*fd);
   pending_.clear();
   const auto banner = receive_line(deadline);

@@ -6,16 +6,6 @@
 namespace embody::ur {
 namespace {
 
-constexpr std::array<UrModel, 7> kModels{{
-    {"UR3e", 5, 0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921},
-    {"UR5e", 5, 0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996},
-    {"UR10e", 5, 0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655},
-    {"UR16e", 5, 0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655},
-    {"UR3", 3, 0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819},
-    {"UR5", 3, 0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823},
-    {"UR10", 3, 0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922},
-}};
-
 constexpr double kQuarter = std::numbers::pi / 2.0;
 
 /// Arms of one generation differ by more; calibrations by much less.
@@ -28,22 +18,18 @@ bool same_letters(std::string_view a, std::string_view b) noexcept {
 
 }  // namespace
 
-std::span<const UrModel> ur_models() noexcept {
-  return kModels;
-}
-
 Result<const UrModel*> find_model(std::string_view name) noexcept {
-  for (const UrModel& model : kModels) {
+  for (const UrModel& model : robot::kUrModels) {
     if (same_letters(model.name, name)) return &model;
   }
-  return make_error(Errc::kNotFound, "there is no arm model '%.*s': choose UR3e, UR5e, UR10e, UR16e, UR3, UR5 or UR10",
+  return make_error(Errc::kNotFound, "there is no arm model '%.*s': choose ur3e, ur5e, ur10e, ur16e, ur3, ur5 or ur10",
                     static_cast<int>(std::min<std::size_t>(name.size(), 40)), name.data());
 }
 
 UrKinematics nominal_kinematics(const UrModel& model) noexcept {
   UrKinematics kinematics;
-  kinematics.a_m = {0.0, model.a2_m, model.a3_m, 0.0, 0.0, 0.0};
-  kinematics.d_m = {model.d1_m, 0.0, 0.0, model.d4_m, model.d5_m, model.d6_m};
+  kinematics.a_m = {0.0, model.geometry.a2_m, model.geometry.a3_m, 0.0, 0.0, 0.0};
+  kinematics.d_m = {model.geometry.d1_m, 0.0, 0.0, model.geometry.d4_m, model.geometry.d5_m, model.geometry.d6_m};
   kinematics.alpha_rad = {kQuarter, 0.0, 0.0, kQuarter, -kQuarter, 0.0};
   return kinematics;
 }
@@ -75,8 +61,8 @@ double flange_distance_m(const UrKinematics& a, const UrKinematics& b) noexcept 
 const UrModel* identify_model(const UrKinematics& reported, int major) noexcept {
   const UrModel* nearest = nullptr;
   double least_m = kSameModel_m;
-  for (const UrModel& model : kModels) {
-    if ((model.first_major == 3) != (major <= 3)) continue;
+  for (const UrModel& model : robot::kUrModels) {
+    if ((model.software_major == 3) != (major <= 3)) continue;
     const double distance_m = flange_distance_m(nominal_kinematics(model), reported);
     if (distance_m < least_m) {
       least_m = distance_m;

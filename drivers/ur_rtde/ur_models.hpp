@@ -1,27 +1,13 @@
 #pragma once
-// The arms of Universal Robots by name: nominal geometry, and whether a controller's own geometry is that of the
-// configured model. Source of the table: Universal Robots, "DH parameters for calculations of kinematics and dynamics".
-#include <span>
-
+// Whether a controller's own geometry is that of the configured model (core/robot/ur_kinematics.hpp has the table).
 #include "core/base/result.hpp"
 #include "core/math/pose.hpp"
+#include "core/robot/ur_kinematics.hpp"
 #include "drivers/ur_rtde/primary_codec.hpp"
 
 namespace embody::ur {
 
-/// Nominal Denavit-Hartenberg lengths (standard convention), m; the twists of all arms are pi/2, 0, 0, pi/2, -pi/2, 0.
-struct UrModel {
-  std::string_view name;
-  int first_major{5};  ///< 3: CB-Series (software 3.x), 5: e-Series
-  double d1_m{0.0};
-  double a2_m{0.0};  ///< negative, as in the vendor's table
-  double a3_m{0.0};  ///< negative
-  double d4_m{0.0};
-  double d5_m{0.0};
-  double d6_m{0.0};
-};
-
-[[nodiscard]] std::span<const UrModel> ur_models() noexcept;
+using robot::UrModel;
 
 /// The model called `name`, upper and lower case alike. The error lists the known names.
 [[nodiscard]] Result<const UrModel*> find_model(std::string_view name) noexcept;

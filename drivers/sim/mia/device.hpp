@@ -16,6 +16,8 @@ class MiaDevice {
  public:
   MiaDevice(const MiaSimulatorConfig& config, TimePoint now);
 
+  using Byte = char;  ///< of receive()
+
   /// Takes bytes of the host that arrived at `now`.
   void receive(std::span<const char> bytes, TimePoint now);
   /// Moves on to `now`; returns what the hand has to say until then.

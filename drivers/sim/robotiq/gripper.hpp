@@ -40,6 +40,8 @@ class RobotiqGripper {
  public:
   RobotiqGripper(const RobotiqGripperConfig& config, TimePoint now);
 
+  using Byte = std::byte;  ///< of receive()
+
   /// Takes bytes of the host that arrived at `now`.
   void receive(std::span<const std::byte> bytes, TimePoint now);
   /// Moves on to `now`; returns what the gripper has to say until then.

@@ -10,9 +10,11 @@ namespace {
 constexpr int kReadOnly = 210;
 constexpr int kWarning = 2;
 
-/// "UR10e" calls itself "UR10" on the dashboard.
-std::string without_series(std::string model) {
+/// "ur10e" calls itself "UR10" on the dashboard.
+std::string dashboard_name(std::string model) {
   if (!model.empty() && model.back() == 'e') model.pop_back();
+  std::transform(model.begin(), model.end(), model.begin(),
+                 [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
   return model;
 }
 
@@ -27,7 +29,7 @@ ControllerLoop::ControllerLoop(const UrControllerConfig& config)
   const auto& v = config.version;
   dashboard_info_.version = std::to_string(v.major) + "." + std::to_string(v.minor) + "." + std::to_string(v.bugfix) +
                             "." + std::to_string(v.build);
-  dashboard_info_.model = without_series(config.model);
+  dashboard_info_.model = dashboard_name(config.model);
   SafetyMachine& machine = robot_.machine();
   machine.set_times(config.times);
   machine.set_remote(config.remote);

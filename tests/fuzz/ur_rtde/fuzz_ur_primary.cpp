@@ -19,7 +19,7 @@ void decode(const ur::PrimaryMessage& message) {
   }
   if (const auto kinematics = ur::decode_kinematics(message.contents)) {
     for (std::size_t i = 0; i < 6; ++i) check(std::isfinite(kinematics->a_m[i]) && std::isfinite(kinematics->d_m[i]));
-    for (const ur::UrModel& model : ur::ur_models()) (void)ur::check_model(model, *kinematics, model.first_major);
+    for (const ur::UrModel& model : robot::kUrModels) (void)ur::check_model(model, *kinematics, model.software_major);
   }
 }
 

@@ -1,6 +1,9 @@
 // `embodyctl arm` and `embodyctl discover` as people and programs call them, against simulated devices.
 #include "daemon/control/exit_code.hpp"
+#include "drivers/sim/mia/mia_simulator.hpp"
+#include "drivers/sim/robotiq/robotiq_simulator.hpp"
 #include "drivers/sim/ur/ur_controller.hpp"
+#include "drivers/transport/tty.hpp"
 #include "tests/integration/system/rig.hpp"
 
 namespace embody::test {
@@ -63,6 +66,44 @@ TEST(ArmCommand, SaysThatNobodyAnswers) {
   const Finished gone = lab.arm("status");
   EXPECT_EQ(gone.exit_code, kExitUnavailable) << gone.output << gone.errors;
   EXPECT_FALSE(json::parse(gone.output, nullptr, false)["error"]["message"].get<std::string>().empty());
+}
+
+/// A hand on a pseudo-terminal and a configuration that names it.
+std::string hand_config(const TemporaryFolder& folder, const std::string& file, const std::string& device,
+                        const std::string& driver) {
+  folder.write("embody.toml", "schema = 1\n[hand]\nfile = \"" EMBODY_SOURCE_DIR "/config/hands/" + file +
+                                  "\"\ndriver = \"" + driver + "\"\ndevice = \"" + device + "\"\n");
+  return folder.file("embody.toml");
+}
+
+Finished hand(const std::string& action, const std::string& config) {
+  return run_program("embodyctl", {"hand", action, "--config", config, "--json"}, 60);
+}
+
+TEST(HandCommand, ActivatesARobotiqAndNothingElseDoes) {
+  sim::RobotiqSimulator simulator({});
+  ASSERT_TRUE(simulator.start().ok());
+  const TemporaryFolder folder;
+  const std::string config = hand_config(folder, "robotiq_2f140.toml", simulator.device(), "robotiq");
+  EXPECT_EQ(hand("calibrate", config).exit_code, kExitFailed) << "that is for a Mia";
+  EXPECT_EQ(simulator.travelled_counts(), 0.0);
+  const Finished activated = hand("activate", config);
+  EXPECT_EQ(activated.exit_code, kExitOk) << activated.output << activated.errors;
+  EXPECT_GT(simulator.travelled_counts(), 100.0) << "the fingers opened and closed";
+}
+
+TEST(HandCommand, CalibratesAMiaAndSaysWhenTheDeviceHasAnOwner) {
+  sim::MiaSimulator simulator({});
+  ASSERT_TRUE(simulator.start().ok());
+  const TemporaryFolder folder;
+  const std::string config = hand_config(folder, "mia.toml", simulator.device(), "mia");
+  {
+    const auto owner = transport::open_tty(simulator.device());
+    ASSERT_TRUE(owner.ok());
+    EXPECT_EQ(hand("calibrate", config).exit_code, kExitRefused);
+  }
+  const Finished calibrated = hand("calibrate", config);
+  EXPECT_EQ(calibrated.exit_code, kExitOk) << calibrated.output << calibrated.errors;
 }
 
 TEST(DiscoverCommand, AnswersWithAListAndTellsWhenItIsEmpty) {

@@ -12,7 +12,7 @@ using test::eventually;
 
 struct Rig {
   Rig() {
-    auto line = open_pty();
+    auto line = transport::open_pty();
     EXPECT_TRUE(line.ok());
     device = std::move(*line);
     const Status opened = proxy.open(device.device);
@@ -39,7 +39,7 @@ struct Rig {
   }
 
   test::Recording recording{LinkKind::kSerial};
-  Pty device;
+  transport::Pty device;
   PtyProxy proxy{*recording.writer};
   transport::UniqueFd host;
 };

@@ -5,8 +5,8 @@
 #include <thread>
 
 #include "drivers/mia/mia_hand.hpp"
-#include "drivers/sim/mia/pty.hpp"
 #include "drivers/transport/clock.hpp"
+#include "drivers/transport/pty.hpp"
 #include "drivers/transport/tcp.hpp"
 #include "drivers/transport/tty.hpp"
 
@@ -49,7 +49,7 @@ struct FarEnd {
 };
 
 struct Bench {
-  explicit Bench(mia::MiaConfig config) : pty(std::move(sim::open_pty()).value()), far(pty.master.get()) {
+  explicit Bench(mia::MiaConfig config) : pty(std::move(transport::open_pty()).value()), far(pty.master.get()) {
     config.device = pty.device;
     config.ack_timeout = seconds(2);  // only what was said counts here, not when
     config.silence_limit = seconds(60);
@@ -94,7 +94,7 @@ struct Bench {
     }
   }
 
-  sim::Pty pty;
+  transport::Pty pty;
   FarEnd far;
   std::optional<mia::MiaHand> hand;
   std::atomic<bool> connected{false};

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "drivers/sim/mia/pty.hpp"
+#include "drivers/transport/pty.hpp"
 #include "drivers/transport/tty.hpp"
 #include "tests/support/heap_counter.hpp"
 #include "tests/unit/mia/rig.hpp"
@@ -221,7 +221,7 @@ TEST(MiaHand, WorksAlthoughAnotherProgramLeftTheDataStreamsOn) {
 }
 
 TEST(MiaHand, ConnectSaysWhenNobodyAnswers) {
-  const auto pty = sim::open_pty();
+  const auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   mia::MiaConfig config;
   config.device = pty->device;

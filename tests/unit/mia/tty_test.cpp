@@ -10,8 +10,8 @@
 
 #include "drivers/mia/mia_hand.hpp"
 #include "drivers/sim/mia/mia_simulator.hpp"
-#include "drivers/sim/mia/pty.hpp"
 #include "drivers/transport/clock.hpp"
+#include "drivers/transport/pty.hpp"
 
 namespace embody::test {
 namespace {
@@ -23,7 +23,7 @@ std::string temporary(const char* name) {
 }
 
 TEST(Tty, CarriesAllByteValuesUnchangedInBothDirections) {
-  auto pty = sim::open_pty();
+  auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   auto host = transport::open_tty(pty->device);
   ASSERT_TRUE(host.ok()) << host.error().detail.view();
@@ -49,7 +49,7 @@ TEST(Tty, CarriesAllByteValuesUnchangedInBothDirections) {
 }
 
 TEST(Tty, IsSetTo115200BaudEightDataBitsNoParityOneStopBitNoFlowControl) {
-  auto pty = sim::open_pty();
+  auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   auto host = transport::open_tty(pty->device);
   ASSERT_TRUE(host.ok());
@@ -63,7 +63,7 @@ TEST(Tty, IsSetTo115200BaudEightDataBitsNoParityOneStopBitNoFlowControl) {
 }
 
 TEST(Tty, HasOneOwnerAtATime) {
-  auto pty = sim::open_pty();
+  auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   {
     auto first = transport::open_tty(pty->device);
@@ -89,7 +89,7 @@ TEST(Tty, SaysWhatIsWrongWithADeviceName) {
 }
 
 TEST(Tty, NamesTheDialoutGroupWhenItMayNotBeOpened) {
-  auto pty = sim::open_pty();
+  auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   ASSERT_EQ(::chmod(pty->device.c_str(), 0), 0);
   const pid_t child = ::fork();
@@ -108,7 +108,7 @@ TEST(Tty, NamesTheDialoutGroupWhenItMayNotBeOpened) {
 }
 
 TEST(Tty, HangUpReadsAsTheEndOfTheSession) {
-  auto pty = sim::open_pty();
+  auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   auto host = transport::open_tty(pty->device);
   ASSERT_TRUE(host.ok());

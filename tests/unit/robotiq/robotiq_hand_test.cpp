@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "drivers/sim/mia/pty.hpp"
+#include "drivers/transport/pty.hpp"
 #include "tests/support/heap_counter.hpp"
 #include "tests/unit/robotiq/rig.hpp"
 
@@ -132,7 +132,7 @@ TEST(RobotiqHand, ReadAndWriteDoNotTouchTheHeap) {
 }
 
 TEST(RobotiqHand, ConnectSaysWhenNobodyAnswers) {
-  const auto pty = sim::open_pty();
+  const auto pty = transport::open_pty();
   ASSERT_TRUE(pty.ok());
   robotiq::RobotiqConfig config;
   config.device = pty->device;

@@ -63,7 +63,7 @@ TEST(PrimaryCodec, ReadsWhatTheSimulatedControllerWrites) {
   EXPECT_EQ(version->title, "URControl");
   EXPECT_EQ(decode(sim::encode_key_message(std::string(300, 'x'), "t"))->title.size(), 255U);
 
-  UrKinematics sent = nominal_kinematics(ur_models()[2]);
+  UrKinematics sent = nominal_kinematics(robot::kUrModels[2]);
   sent.theta_rad = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
   sent.checksum = {1, 2, 3, 4, 5, 6};
   const auto state = sim::encode_robot_state({}, &sent);
@@ -97,7 +97,7 @@ TEST(PrimaryCodec, EveryShorterMessageIsIncompleteOrRefused) {
 
 TEST(PrimaryCodec, SurvivesRandomDamage) {
   std::mt19937_64 random(21);
-  const UrKinematics kinematics = nominal_kinematics(ur_models()[0]);
+  const UrKinematics kinematics = nominal_kinematics(robot::kUrModels[0]);
   const std::vector<sim::Message> seeds{sim::encode_robot_state({}, &kinematics), sim::encode_version({5, 1, 2, 3}),
                                         sim::encode_error_code(1, 2, 3, "x"),     sim::encode_key_message("a", "b"),
                                         sim::encode_runtime_exception(1, 2, "c"), sim::encode_text_message("d")};

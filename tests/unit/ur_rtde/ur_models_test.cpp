@@ -25,12 +25,12 @@ UrKinematics calibrated_ur10e() {
 }
 
 TEST(UrModels, AreFoundByNameAndAnUnknownOneListsThem) {
-  ASSERT_EQ(ur_models().size(), 7U);
-  for (const UrModel& model : ur_models()) EXPECT_EQ(*find_model(model.name), &model);
-  EXPECT_EQ((*find_model("ur10E"))->name, "UR10e");
+  ASSERT_EQ(robot::kUrModels.size(), 7U);
+  for (const UrModel& model : robot::kUrModels) EXPECT_EQ(*find_model(model.name), &model);
+  EXPECT_EQ((*find_model("ur10E"))->name, "ur10e");
   const auto unknown = find_model("UR99");
   ASSERT_FALSE(unknown);
-  EXPECT_NE(unknown.error().detail.view().find("UR16e"), std::string_view::npos);
+  EXPECT_NE(unknown.error().detail.view().find("ur16e"), std::string_view::npos);
 }
 
 TEST(UrModels, FlangePosesAreThoseOfTheVendorsTable) {
@@ -42,7 +42,7 @@ TEST(UrModels, FlangePosesAreThoseOfTheVendorsTable) {
 TEST(UrModels, EveryModelIsRecognisedWithinItsSeriesAndTakenForNoOther) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> noise(-0.0005, 0.0005);
-  for (const UrModel& model : ur_models()) {
+  for (const UrModel& model : robot::kUrModels) {
     for (int i = 0; i < 200; ++i) {
       UrKinematics reported = nominal_kinematics(model);  // with calibration deltas of the usual size
       for (std::size_t k = 0; k < 6; ++k) {
@@ -51,7 +51,7 @@ TEST(UrModels, EveryModelIsRecognisedWithinItsSeriesAndTakenForNoOther) {
         reported.d_m[k] += noise(random);
         reported.alpha_rad[k] += noise(random);
       }
-      ASSERT_EQ(identify_model(reported, model.first_major), &model) << model.name;
+      ASSERT_EQ(identify_model(reported, model.software_major), &model) << model.name;
     }
   }
 }
@@ -64,7 +64,7 @@ TEST(UrModels, ARealCalibrationWithFarAwayJointsIsStillAUr10e) {
   EXPECT_TRUE(check_model(**find_model("UR10e"), reported, 5).ok());
   const Status other = check_model(**find_model("UR5e"), reported, 5);
   ASSERT_FALSE(other);
-  EXPECT_NE(other.error().detail.view().find("UR10e"), std::string_view::npos) << other.error().detail.c_str();
+  EXPECT_NE(other.error().detail.view().find("ur10e"), std::string_view::npos) << other.error().detail.c_str();
 }
 
 TEST(UrModels, AnUnknownGeometryIsSaidToBeUnknown) {

@@ -172,7 +172,7 @@ TEST(UrInstallation, AWrongPayloadToolOrModelIsASentence) {
   driver.expected.cog_m->at(0) = 0.1;
   EXPECT_TRUE(ServicedLoop(driver).says({"centre of gravity"}));
   driver.expected.model = "UR5e";
-  EXPECT_TRUE(ServicedLoop(driver).says({"UR5e", "UR10e", "arm model"}));
+  EXPECT_TRUE(ServicedLoop(driver).says({"ur5e", "ur10e", "arm model"}));
 }
 
 TEST(UrInstallation, FirmwareWithoutTheSettingsIsNotCompared) {

@@ -1,4 +1,4 @@
-#include "drivers/capture/pty.hpp"
+#include "drivers/transport/pty.hpp"
 
 #include <fcntl.h>
 #include <termios.h>
@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace embody::capture {
+namespace embody::transport {
 
 Result<Pty> open_pty() {
   Pty pty;
@@ -21,18 +21,19 @@ Result<Pty> open_pty() {
   }
   pty.device = name.data();
   // The kernel reports a hang-up only after a first opening.
-  transport::UniqueFd first(::open(pty.device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
+  UniqueFd first(::open(pty.device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
   if (!first) return make_error(Errc::kIo, "cannot open %s: %s", pty.device.c_str(), std::strerror(errno));
   first.reset();
-  make_raw(master);
+  if (!make_raw(master))
+    return make_error(Errc::kIo, "cannot make %s raw: %s", pty.device.c_str(), std::strerror(errno));
   return pty;
 }
 
-void make_raw(int fd) noexcept {
+bool make_raw(int fd) noexcept {
   termios settings{};
-  if (::tcgetattr(fd, &settings) != 0) return;
+  if (::tcgetattr(fd, &settings) != 0) return false;
   ::cfmakeraw(&settings);
-  ::tcsetattr(fd, TCSANOW, &settings);
+  return ::tcsetattr(fd, TCSANOW, &settings) == 0;
 }
 
-}  // namespace embody::capture
+}  // namespace embody::transport

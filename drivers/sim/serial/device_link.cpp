@@ -1,36 +1,14 @@
-#include "drivers/sim/mia/pty.hpp"
+#include "drivers/sim/serial/device_link.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
-#include <termios.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <climits>
-#include <cstdlib>
 #include <cstring>
 
 namespace embody::sim {
-
-bool make_raw(int master) noexcept {
-  termios settings{};
-  if (::tcgetattr(master, &settings) != 0) return false;
-  ::cfmakeraw(&settings);
-  return ::tcsetattr(master, TCSANOW, &settings) == 0;
-}
-
-Result<Pty> open_pty() {
-  Pty pty;
-  pty.master.reset(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  const int master = pty.master.get();
-  std::array<char, 64> name{};
-  if (!pty.master || ::grantpt(master) != 0 || ::unlockpt(master) != 0 ||
-      ::ptsname_r(master, name.data(), name.size()) != 0 || !make_raw(master)) {
-    return make_error(Errc::kIo, "cannot create a pseudo-terminal: %s", std::strerror(errno));
-  }
-  pty.device = name.data();
-  return pty;
-}
 
 Status DeviceLink::create(const std::string& path, const std::string& device) {
   remove();

@@ -1,22 +1,10 @@
 #pragma once
-// A pseudo-terminal whose far end looks like a serial device.
+// A stable name for a pseudo-terminal.
 #include <string>
 
 #include "core/base/result.hpp"
-#include "drivers/transport/unique_fd.hpp"
 
 namespace embody::sim {
-
-struct Pty {
-  transport::UniqueFd master;  ///< non-blocking
-  std::string device;          ///< what a host opens
-};
-
-/// Errors: kIo.
-[[nodiscard]] Result<Pty> open_pty();
-
-/// Makes the line raw (no echo, no translation). The kernel forgets that whenever the last host closes the device.
-bool make_raw(int master) noexcept;
 
 /// A symlink that lives as long as its owner.
 class DeviceLink {
