@@ -73,6 +73,27 @@ TEST(TrackerLoop, UsesEveryBufferedFrameOnceAndPublishesTheNewest) {
   EXPECT_TRUE(wait_for_input(bench.edges.fingers_wake.fd(), -1, Duration{0})) << "the finger loop was woken";
 }
 
+TEST(TrackerLoop, DoesNotTrustPosesAfterTheLabelsMayHaveChanged) {
+  TrackerBench bench;
+  constexpr std::uint64_t kFrames = 200, kBefore = 100;
+  std::uint64_t number = 0;
+  const TimePoint start = now();
+  bench.tracker.on_read = [&](MarkerFrame& frame) {
+    if (number == kFrames) {
+      bench.edges.stop = true;
+      return IoStatus::kEmpty;
+    }
+    ++number;
+    TrackerBench::fill(frame, number, start + number * std::chrono::milliseconds(10));
+    frame.label_epoch = number <= kBefore ? 7 : 8;
+    return IoStatus::kDone;
+  };
+  EXPECT_EQ(bench.run(), 0U) << "heap uses";
+  EXPECT_EQ(bench.edges.counters.poses_invalid, 50U) << "the first epoch needs no trial, the second one does";
+  ASSERT_TRUE(bench.edges.pose_to_arm.update());
+  EXPECT_EQ(bench.edges.pose_to_arm.get().streak, kFrames - kBefore - 50) << "motion does not go on across it";
+}
+
 TEST(TrackerLoop, PredictsThePoseOfTheArmAndLeavesThatOfTheFingersAsMeasured) {
   teleop::PosePredictorConfig predictor;
   predictor.ahead = std::chrono::milliseconds(50);
