@@ -1,9 +1,11 @@
-# embody_library(NAME SOURCES ... LINKS ...): a static library with the project's include root and warnings.
+# embody_library(NAME SOURCES ... LINKS ...): a static library with the project's include root and warnings. Adds its name
+# to the global property EMBODY_LIBRARIES.
 function(embody_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS} embody_warnings)
+  set_property(GLOBAL APPEND PROPERTY EMBODY_LIBRARIES ${name})
 endfunction()
 
 # embody_executable(NAME SOURCES ... LINKS ...)

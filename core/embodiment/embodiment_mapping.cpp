@@ -11,7 +11,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::Vector3d;
-using robot::kNoIndex;
 
 constexpr Duration kUsualStep = std::chrono::milliseconds(10);
 constexpr std::size_t kScanned = 2;  // groups of so few motors start from a scan, others from the last frame

@@ -31,7 +31,7 @@ Vector3d dorsal_P(const robot::HandAnatomy& anatomy, const SerialFinger& chain, 
 /// From the knuckle to the next joint that is a phalanx away, else to the tip.
 Vector3d first_phalanx_P(const std::vector<Pose>& X_PL, const robot::RobotModel& model, const SerialFinger& chain) {
   for (std::size_t i = chain.knuckle + 1; i < chain.joints.size(); ++i) {
-    const Vector3d p = X_PL[model.joints[chain.joints[i]].child_link].translation() - chain.p_knuckle_P;
+    Vector3d p = X_PL[model.joints[chain.joints[i]].child_link].translation() - chain.p_knuckle_P;
     if (p.norm() > kLeastPhalanx_m) return p;
   }
   return chain.p_tip_P - chain.p_knuckle_P;

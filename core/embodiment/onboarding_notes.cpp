@@ -33,6 +33,7 @@ std::string joined(const std::vector<std::string>& names) {
 
 std::string joint_names(const RobotModel& model, const std::vector<std::size_t>& joints) {
   std::vector<std::string> names;
+  names.reserve(joints.size());
   for (const std::size_t j : joints) names.push_back(model.joints[j].name);
   return joined(names);
 }

@@ -111,9 +111,9 @@ Samples sample_robot(Tips& tips, const robot::HandAnatomy& anatomy, int count) {
 }
 
 /// Pattern search from the best samples: one motor at a time, steps from an eighth of its range down to a thousandth.
-double least_pinch(Tips& tips, std::size_t finger, std::vector<std::pair<double, Motors>> starts) {
+double least_pinch(Tips& tips, std::size_t finger, const std::vector<std::pair<double, Motors>>& starts) {
   double least = std::numeric_limits<double>::infinity();
-  for (auto& [distance, r] : starts) {
+  for (auto [distance, r] : starts) {
     for (double step = 0.125; step > 1e-3 && least > kPinchTouch_m && distance > kPinchTouch_m;) {
       bool better = false;
       for (std::size_t motor = 0; motor < r.size(); ++motor) {

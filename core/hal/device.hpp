@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "core/base/fixed_string.hpp"
+#include "core/hal/counter.hpp"
 
 namespace embody {
 
@@ -19,12 +20,21 @@ class Device {
   Device& operator=(const Device&) = delete;
   /// Why the last session ended, for people; empty while it lasts. Call it from the owner of the driver.
   [[nodiscard]] std::string_view reason() const noexcept { return reason_.view(); }
+  /// What happened since the driver was made, sessions included that are over. From any thread, whoever owns the
+  /// driver.
+  [[nodiscard]] std::span<const NamedCounter> named_counters() const noexcept { return table_.view(); }
 
  protected:
   Device() = default;
   ~Device() = default;
+  /// For the constructor. Names members of the driver itself: its address never changes, and a session is too
+  /// short-lived.
+  void show(std::initializer_list<NamedCounter> counters) noexcept { table_ = CounterTable(counters); }
 
   FixedString<240> reason_;
+
+ private:
+  CounterTable table_;
 };
 
 }  // namespace embody

@@ -7,6 +7,7 @@
 
 #include "core/base/fixed_string.hpp"
 #include "core/base/time.hpp"
+#include "core/hal/hand_telemetry.hpp"
 #include "core/math/pose.hpp"
 
 namespace embody {
@@ -170,6 +171,7 @@ struct HandDeviceState {
   TimePoint t_arrival{};
   std::size_t joint_count{0};
   std::array<double, kMaxHandJoints> q_rad{};
+  HandTelemetry telemetry;  ///< as of this reply
 };
 
 enum class HandAction : std::uint8_t {

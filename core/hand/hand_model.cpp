@@ -116,9 +116,9 @@ std::array<Pose, kHandModelJoints> HandModel::joint_poses(const Vector48& q_rad)
 }
 
 std::size_t HandModel::joints_moving(Finger finger, std::size_t point) const noexcept {
-  int level = -1;
-  for (const Term& term : at(finger, point).terms) level = std::max(level, term.level);
-  return static_cast<std::size_t>(level + 1);
+  int levels = 0;
+  for (const Term& term : at(finger, point).terms) levels = std::max(levels, term.level + 1);
+  return static_cast<std::size_t>(levels);
 }
 
 FingerChain HandModel::chain(Finger finger, const Vector9& q_rad) const noexcept {

@@ -111,7 +111,7 @@ void find_knuckle(const Scene& scene, SerialFinger& chain) {
 /// The last joint-to-joint segment longer than `least`, joint origins from the palm's end; 0 if there is none.
 Vector3d last_segment(const Scene& scene, const SerialFinger& chain, double least) {
   for (std::size_t i = chain.joints.size(); i-- > 1;) {
-    const Vector3d segment = scene.origin_P(chain.joints[i]) - scene.origin_P(chain.joints[i - 1]);
+    Vector3d segment = scene.origin_P(chain.joints[i]) - scene.origin_P(chain.joints[i - 1]);
     if (segment.norm() > least) return segment;
   }
   return Vector3d::Zero();

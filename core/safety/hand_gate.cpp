@@ -14,7 +14,7 @@ const char* to_string(HandHold hold) noexcept {
     case HandHold::kMode:
       return "not engaged";
     case HandHold::kNoAnswer:
-      return "the robot hand has not answered";
+      return "the robot hand does not tell where it is";
     case HandHold::kNotSeen:
       return "the pose of the human hand is not known";
     case HandHold::kTargetStale:
@@ -30,7 +30,7 @@ HandHold HandGate::obstacle(TimePoint now, const ModeState& mode, const FingerTa
                             const HandDeviceState& measured) const noexcept {
   if (now - mode.t > config_.mode_timeout) return HandHold::kModeStale;
   if (mode.mode != Mode::kEngaged) return HandHold::kMode;
-  if (measured.reply == 0) return HandHold::kNoAnswer;
+  if (measured.reply == 0 || now - measured.t_arrival > config_.measured_timeout) return HandHold::kNoAnswer;
   if (!target.valid || target.joint_count != measured.joint_count) return HandHold::kNotSeen;
   if (now - target.t_capture > config_.target_timeout) return HandHold::kTargetStale;
   if (!sure(target.hand_confidence)) return HandHold::kUnsure;
@@ -46,10 +46,12 @@ HandCommand HandGate::step(TimePoint now, double dt_s, const ModeState& mode, co
   command.joint_count = measured.joint_count;
   kept_joints_ = 0;
   hold_ = obstacle(now, mode, target, measured);
+  if (stopped_ && hold_ == HandHold::kNone) hold_ = HandHold::kMode;
+  stopped_ = false;
   if (hold_ != HandHold::kNone) {
     following_ = false;
-    const bool stopped = hold_ == HandHold::kMode && mode.mode == Mode::kStopped;
-    command.action = stopped ? HandAction::kStop : HandAction::kHold;
+    stopped_ = hold_ == HandHold::kMode && mode.mode == Mode::kStopped;
+    command.action = stopped_ ? HandAction::kStop : HandAction::kHold;
     return command;
   }
   if (!following_) goal_rad_ = q_rad_ = measured.q_rad;
@@ -62,6 +64,9 @@ HandCommand HandGate::step(TimePoint now, double dt_s, const ModeState& mode, co
       goal_rad_[i] = target.q_rad[i];
     }
     q_rad_[i] += std::clamp(goal_rad_[i] - q_rad_[i], -step, step);
+    const double q_measured_rad = measured.q_rad[i];
+    if (std::isfinite(q_measured_rad))
+      q_rad_[i] = std::clamp(q_rad_[i], q_measured_rad - config_.lead_rad, q_measured_rad + config_.lead_rad);
   }
   command.action = HandAction::kMove;
   command.q_rad = q_rad_;

@@ -10,6 +10,10 @@ struct HandGateConfig {
   Duration mode_timeout{std::chrono::milliseconds(100)};    ///< an older ModeState counts as holding
   Duration target_timeout{std::chrono::milliseconds(500)};  ///< an older finger target is not followed
   double min_confidence{0.0};                               ///< 0..1: what is less sure than this is not followed
+  /// A command is at most this far from where its joint is measured to be: by that a hand without a watchdog goes on
+  /// when its line is cut, or when what blocked it gives way. 0.15 rad less what hands round to.
+  double lead_rad{0.14};
+  Duration measured_timeout{std::chrono::milliseconds(150)};  ///< angles that are older say nothing: no motion
 };
 
 /// Why the hand does not move.
@@ -17,7 +21,7 @@ enum class HandHold : std::uint8_t {
   kNone,         ///< it moves
   kModeStale,    ///< the arm loop is late or dead
   kMode,         ///< not engaged
-  kNoAnswer,     ///< the robot hand has not told where its joints are
+  kNoAnswer,     ///< the robot hand has not told lately where its joints are
   kNotSeen,      ///< no valid finger target: the pose of the human hand is not known
   kTargetStale,  ///< the newest finger target is too old
   kUnsure,       ///< confidence in the back of the human hand is below min_confidence
@@ -32,7 +36,8 @@ class HandGate {
 
   /// Only an engaged, current mode and a current, sure target move the hand; motion starts from the measured angles.
   /// A joint whose own confidence is below the limit keeps its last sure target while the others go on.
-  /// `stopped` modes yield kStop, everything else kHold. sequence and t_expires are left to the caller.
+  /// `stopped` modes yield kStop, everything else kHold; after a kStop the first command that is none is a kHold, since
+  /// that is what opens a driver's latch. sequence and t_expires are left to the caller.
   [[nodiscard]] HandCommand step(TimePoint now, double dt_s, const ModeState& mode, const FingerTarget& target,
                                  const HandDeviceState& measured) noexcept;
 
@@ -49,6 +54,7 @@ class HandGate {
 
   HandGateConfig config_;
   bool following_{false};
+  bool stopped_{false};  // the last command was kStop
   HandHold hold_{HandHold::kNoAnswer};
   std::uint32_t kept_joints_{0};
   std::array<double, kMaxHandJoints> goal_rad_{};  // newest sure targets

@@ -41,7 +41,7 @@ class PoseMonitor {
     if (!pose.valid || !math::is_valid(pose.X_WM)) {
       pose.valid = false;
       streak_ = 0;
-    } else if (!started_ || plausible(pose, last_)) {
+    } else if (!started_ || (plausible(pose, last_) && !confirms_suspect(pose))) {
       const bool gap = !started_ || pose.t_capture - last_.t_capture > gap_;
       streak_ = gap ? 1 : streak_ + 1;
       last_ = pose;
@@ -60,6 +60,18 @@ class PoseMonitor {
     }
     pose.streak = streak_;
     pose.jumps = jumps_;
+  }
+
+  /// Time alone makes a jump no motion: while poses gather at another place, what agrees with them is one of them, even
+  /// when a hand could have got there meanwhile.
+  [[nodiscard]] bool confirms_suspect(const HandPose& pose) const noexcept {
+    return suspects_ > 0 && plausible(pose, suspect_) && least_time_s(pose, suspect_) < least_time_s(pose, last_);
+  }
+
+  /// What the fastest hand needs from one pose to the other.
+  [[nodiscard]] static double least_time_s(const HandPose& a, const HandPose& b) noexcept {
+    return (a.X_WM.translation() - b.X_WM.translation()).norm() / kSpeed_m_s +
+           math::angle_between(a.X_WM.linear(), b.X_WM.linear()) / kSpeed_rad_s;
   }
 
   [[nodiscard]] static bool plausible(const HandPose& pose, const HandPose& before) noexcept {

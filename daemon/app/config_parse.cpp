@@ -1,15 +1,13 @@
-// Parsing: the visitor that fills the configuration structs from TOML. The only place that includes toml++.
+// Parsing: the visitor that fills the configuration structs from TOML.
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <set>
-#include <type_traits>
 
 #include "daemon/app/config_file.hpp"
 #include "daemon/app/config_io.hpp"
+#include "daemon/app/config_part.hpp"
 #include "daemon/app/config_suggest.hpp"
+#include "daemon/app/config_values.hpp"
 
 namespace embody::config {
 namespace {
@@ -57,115 +55,6 @@ toml::table parse_text(std::string_view text, const Source& source, Load& load) 
                              std::string(error.description())});
     return {};
   }
-}
-
-const char* type_name(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "a list";
-    case toml::node_type::string:
-      return "text";
-    case toml::node_type::integer:
-      return "a whole number";
-    case toml::node_type::floating_point:
-      return "a number with a fraction";
-    case toml::node_type::boolean:
-      return "true/false";
-    default:
-      return "a date or time";
-  }
-}
-
-std::string wanted(const char* what, const toml::node& node) {
-  return std::string("must be ") + what + ", not " + type_name(node);
-}
-
-std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-/// The readers of values return why the node is not acceptable, or "".
-std::string check_range(double value, Range range, std::string_view unit) {
-  if (value >= range.min && value <= range.max) return {};
-  return "is " + number_text(value) + ", out of range: " + number_text(range.min) + " to " + number_text(range.max) +
-         (unit.empty() ? "" : " ") + std::string(unit);
-}
-
-std::string read_value(const toml::node& node, double& value, Range range, std::string_view unit) {
-  if (!node.is_number()) return wanted("a number", node);
-  const double number = node.is_integer() ? static_cast<double>(**node.as_integer()) : **node.as_floating_point();
-  if (!std::isfinite(number)) return "must be finite, not nan or inf";
-  auto why = check_range(number, range, unit);
-  if (why.empty()) value = number;
-  return why;
-}
-
-std::string read_value(const toml::node& node, int& value, Range range, std::string_view unit) {
-  const auto* integer = node.as_integer();
-  if (integer == nullptr) return wanted("a whole number", node);
-  auto why = check_range(static_cast<double>(**integer), range, unit);
-  if (why.empty()) value = static_cast<int>(**integer);
-  return why;
-}
-
-template <class Rep, class Period>
-std::string read_value(const toml::node& node, std::chrono::duration<Rep, Period>& value, Range range,
-                       std::string_view unit) {
-  int count = 0;
-  auto why = read_value(node, count, range, unit);
-  if (why.empty()) value = std::chrono::duration<Rep, Period>(count);
-  return why;
-}
-
-std::string read_value(const toml::node& node, bool& value, Range, std::string_view) {
-  if (!node.is_boolean()) return wanted("true or false", node);
-  value = **node.as_boolean();
-  return {};
-}
-
-constexpr std::size_t kMaxText = 256;
-
-std::string read_value(const toml::node& node, std::string& value, Range, std::string_view) {
-  const auto* text = node.as_string();
-  if (text == nullptr) return wanted("text", node);
-  const std::string& content = **text;
-  if (content.size() > kMaxText) return "is longer than " + std::to_string(kMaxText) + " bytes";
-  if (std::any_of(content.begin(), content.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
-    return "contains a control character";
-  }
-  value = content;
-  return {};
-}
-
-constexpr std::size_t kMaxItems = 64;  // of a list
-
-/// A list of any length, or exactly as many numbers as a fixed array has.
-template <class T>
-requires requires(T& sequence) {
-  sequence.begin();
-}
-std::string read_value(const toml::node& node, T& value, Range range, std::string_view unit) {
-  const auto* array = node.as_array();
-  if (array == nullptr) return wanted("a list", node);
-  T items = value;
-  if constexpr (requires { items.clear(); }) {
-    if (array->size() > kMaxItems) return "has more than " + std::to_string(kMaxItems) + " entries";
-    items.resize(array->size());
-  } else if (array->size() != static_cast<std::size_t>(items.size())) {
-    return "needs " + std::to_string(items.size()) + " numbers, has " + std::to_string(array->size());
-  }
-  std::size_t i = 0;
-  for (auto& item : items) {
-    const auto why = read_value((*array)[i], item, range, unit);
-    if (!why.empty()) return "entry " + std::to_string(i + 1) + " " + why;
-    ++i;
-  }
-  value = items;
-  return {};
 }
 
 /// An included file may leave the schema number out, but not have another one.
@@ -365,9 +254,6 @@ Result<EmbodyConfig> parse_config(std::string_view text, const std::string& name
   return config;
 }
 
-namespace {
-
-/// One of the files that a configuration includes, on its own.
 template <class T>
 Result<T> load_part(const fs::path& path) {
   const auto content = read_file(path);
@@ -386,28 +272,7 @@ Result<T> load_part(const fs::path& path) {
   return part;
 }
 
-}  // namespace
-
-Result<SubjectConfig> load_subject(const fs::path& path) {
-  return load_part<SubjectConfig>(path);
-}
-
-Result<HandConfig> load_hand(const std::string& name) {
-  const bool is_file = name.find('/') != std::string::npos || name.ends_with(".toml");
-  if (is_file) return load_part<HandConfig>(name);
-  std::set<std::string> shipped;
-  for (const fs::path& folder : data_folders()) {
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(folder / "hands", ignored)) {
-      if (entry.path().extension() != ".toml") continue;
-      if (entry.path().stem() == name) return load_part<HandConfig>(entry.path());
-      shipped.insert(entry.path().stem());
-    }
-  }
-  std::string names;
-  for (const std::string& hand : shipped) names += (names.empty() ? "" : ", ") + hand;
-  return make_error(Errc::kNotFound, "there is no hand \"%.60s\"; shipped are %s; or name a file (.toml)", name.c_str(),
-                    names.c_str());
-}
+template Result<SubjectConfig> load_part<SubjectConfig>(const fs::path& path);
+template Result<HandConfig> load_part<HandConfig>(const fs::path& path);
 
 }  // namespace embody::config

@@ -30,8 +30,10 @@ ArmLoopConfig arm_loop_config(const config::EmbodyConfig& config) {
 }
 
 safety::HandGateConfig hand_gate_config(const config::EmbodyConfig& config) {
-  return {config.hand.joint_speed_rad_s, config.safety.mode_timeout, config.safety.finger_timeout,
-          config.safety.min_hand_confidence};
+  safety::HandGateConfig gate{config.hand.joint_speed_rad_s, config.safety.mode_timeout, config.safety.finger_timeout,
+                              config.safety.min_hand_confidence};
+  gate.measured_timeout = std::max(gate.measured_timeout, from_seconds(3.0 / config.hand.rate_hz));  // a slow bus
+  return gate;
 }
 
 /// A link over one baton; `service` may be empty.

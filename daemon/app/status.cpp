@@ -1,10 +1,11 @@
 // The status object of the control socket (docs/control.md).
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "daemon/app/daemon.hpp"
+#include "daemon/app/hand_report.hpp"
 #include "daemon/app/heap_guard.hpp"
 #include "daemon/app/version.hpp"
-#include "drivers/landmarks/landmark_tracker.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/ur_rtde/status_text.hpp"
 
@@ -46,18 +47,10 @@ json counters_json(const Edges& edges, const TelemetrySnapshot& telemetry, const
           {"rt_heap_allocations", heap_guard::count()}};
 }
 
-/// What became of the datagrams of a landmark tracker; empty with another tracker.
-json landmarks_json(const HandTracker& tracker, const Edges& edges) {
-  const auto* landmarks = dynamic_cast<const landmarks::LandmarkTracker*>(&tracker);
-  if (landmarks == nullptr) return json::object();
-  const landmarks::LandmarkCounters c = landmarks->counters();
-  return {{"received", c.received},
-          {"malformed", c.malformed},
-          {"foreign", c.foreign},
-          {"other_hand", c.other_hand},
-          {"duplicates", c.duplicates},
-          {"restarts", c.restarts},
-          {"palm_scale", edges.palm_scale.load(std::memory_order_relaxed)}};
+/// Empty with a tracker of markers.
+json landmarks_json(config::TrackerDriver driver, const Edges& edges) {
+  if (driver != config::TrackerDriver::kLandmarks) return json::object();
+  return {{"palm_scale", edges.palm_scale.load(std::memory_order_relaxed)}};
 }
 
 json latency_json(const TelemetrySnapshot& telemetry) {
@@ -154,13 +147,21 @@ json filter_json(const Edges& edges, const config::FilterConfig& config) {
           {"predict_pose_ms", config.predict_pose.count()}};
 }
 
-json devices_json(const std::vector<DeviceReport>& reports) {
+/// Any thread may read them: the table is made with the driver, and the drivers live as long as the daemon.
+json device_counters_json(const Device& device) {
+  json counters = json::object();
+  for (const NamedCounter& counter : device.named_counters()) counters[counter.name] = counter.value->get();
+  return counters;
+}
+
+json devices_json(const std::vector<DeviceReport>& reports, const std::map<std::string, const Device*>& drivers) {
   json devices = json::object();
   for (const DeviceReport& report : reports) {
     devices[report.name] = {{"state", report.connected ? "connected" : "missing"},
                             {"peer", report.peer},
                             {"detail", report.detail},
-                            {"sessions", report.sessions}};
+                            {"sessions", report.sessions},
+                            {"counters", device_counters_json(*drivers.at(report.name))}};
   }
   return devices;
 }
@@ -170,17 +171,19 @@ json devices_json(const std::vector<DeviceReport>& reports) {
 std::string Daemon::status_json() {
   const TelemetrySnapshot telemetry = telemetry_->snapshot();
   const safety::ModeState mode_now = mode();
+  const std::map<std::string, const Device*> drivers{
+      {"tracker", tracker_.get()}, {"arm", arm_.get()}, {"hand", hand_.get()}};
   const json status{{"version", kVersion},
                     {"uptime_s", to_seconds(transport::now() - t_start_)},
                     {"mode", mode_json(mode_now)},
-                    {"devices", devices_json(links_->reports())},
+                    {"devices", devices_json(links_->reports(), drivers)},
                     {"robot", robot_json(telemetry.arm)},
                     {"rates_hz",
                      {{"tracker", telemetry.tracker_hz},
                       {"arm", telemetry.arm_hz},
                       {"hand", telemetry.hand_hz},
                       {"fingers", telemetry.fingers_hz}}},
-                    {"landmarks", landmarks_json(*tracker_, edges_)},
+                    {"landmarks", landmarks_json(config_.tracker.driver, edges_)},
                     {"counters", counters_json(edges_, telemetry, mode_now)},
                     {"latency_us", latency_json(telemetry)},
                     {"resample_delay_ms", config_.arm.resample_delay.count()},
@@ -188,6 +191,7 @@ std::string Daemon::status_json() {
                     {"marker_residual_mm", residual_json(telemetry)},
                     {"confidence", confidence_json(telemetry)},
                     {"quality", quality_json(telemetry.quality)},
+                    {"hand", hand_json(telemetry.hand, config_.hand.embodiment.motors)},
                     {"robot_hand", robot_hand_json(telemetry, config_.hand.embodiment.motors)},
                     {"tracking",
                      {{"arm_error_mm", telemetry.arm_error_m * 1e3},

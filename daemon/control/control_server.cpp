@@ -11,8 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/control/listen.hpp"
-
 namespace embody::control {
 namespace {
 
@@ -45,8 +43,11 @@ Peer peer_of(int fd) noexcept {
 
 class ControlServer::Impl {
  public:
-  Impl(Listener listener, UniqueFd epoll, Handler handler)
-      : listener_(std::move(listener)), epoll_(std::move(epoll)), handler_(std::move(handler)) {
+  Impl(Listener listener, UniqueFd epoll, Handler handler, LineHandler lines)
+      : listener_(std::move(listener)),
+        epoll_(std::move(epoll)),
+        handler_(std::move(handler)),
+        lines_(std::move(lines)) {
     clients_.reserve(kMaxClients);
   }
 
@@ -145,6 +146,11 @@ class ControlServer::Impl {
 
   void answer(Client& client, std::string_view line) {
     if (line.empty() || line == "\r") return;
+    if (lines_) {
+      ++counters_.requests;
+      client.out += answer_line(line);
+      return;
+    }
     auto request = parse_request(line);
     if (!request) {
       ++counters_.malformed;
@@ -157,6 +163,14 @@ class ControlServer::Impl {
     request->peer = client.peer;
     if (request->command == Command::kSubscribe) return subscribe(client, *request);
     client.out += format_response(ask(*request), request->id);
+  }
+
+  [[nodiscard]] std::string answer_line(std::string_view line) const {
+    try {
+      return lines_(line);
+    } catch (const std::exception& error) {
+      return format_response(refusal(code::kFailed, error.what()), {});
+    }
   }
 
   [[nodiscard]] Response ask(const Request& request) const {
@@ -232,19 +246,29 @@ class ControlServer::Impl {
   Listener listener_;
   UniqueFd epoll_;
   Handler handler_;
+  LineHandler lines_;  // in place of the handler
   std::vector<Client> clients_;
   ServerCounters counters_;
 };
 
-Result<std::unique_ptr<ControlServer>> ControlServer::open(const ServerConfig& config, Handler handler) {
-  auto listener = listen_unix(config.path, config.group_access);
+Result<std::unique_ptr<ControlServer>> ControlServer::open(const ServerConfig& config, Handler handler,
+                                                           LineHandler lines) {
+  auto listener = listen_unix(config.path, config.group_access, config.owner);
   if (!listener) return listener.error();
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
-  auto impl = std::make_unique<Impl>(std::move(*listener), std::move(epoll), std::move(handler));
+  auto impl = std::make_unique<Impl>(std::move(*listener), std::move(epoll), std::move(handler), std::move(lines));
   if (impl->fd() < 0 || !impl->watch(impl->listener_fd(), EPOLLIN)) {
     return make_error(Errc::kIo, "control socket: the system has no epoll descriptor left");
   }
   return std::unique_ptr<ControlServer>(new ControlServer(std::move(impl)));
+}
+
+Result<std::unique_ptr<ControlServer>> ControlServer::open(const ServerConfig& config, Handler handler) {
+  return open(config, std::move(handler), nullptr);
+}
+
+Result<std::unique_ptr<ControlServer>> ControlServer::open_lines(const ServerConfig& config, LineHandler handler) {
+  return open(config, nullptr, std::move(handler));
 }
 
 ControlServer::ControlServer(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
+#include "daemon/control/listen.hpp"
 #include "daemon/control/protocol.hpp"
 
 namespace embody::control {
@@ -12,6 +13,7 @@ namespace embody::control {
 struct ServerConfig {
   std::string path;          ///< of the socket, see server_socket_path()
   bool group_access{false};  ///< 0660 and a folder of 0750 instead of 0600 and 0700
+  SocketOwner owner{};
 };
 
 /// What happened since the start.
@@ -35,6 +37,13 @@ class ControlServer {
   /// folder of another user), kIo.
   [[nodiscard]] static Result<std::unique_ptr<ControlServer>> open(const ServerConfig& config, Handler handler);
 
+  /// Answers a line of another protocol with lines of it, each with its newline. What the server says itself (busy,
+  /// overlong) are error responses of the control protocol.
+  using LineHandler = std::function<std::string(std::string_view line)>;
+  /// The same server with requests of another kind. Errors as open().
+  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> open_lines(const ServerConfig& config,
+                                                                         LineHandler handler);
+
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
   /// Sends what can be sent at once, disconnects everybody and removes the socket file.
@@ -50,6 +59,7 @@ class ControlServer {
  private:
   class Impl;
   explicit ControlServer(std::unique_ptr<Impl> impl) noexcept;
+  static Result<std::unique_ptr<ControlServer>> open(const ServerConfig& config, Handler handler, LineHandler lines);
   std::unique_ptr<Impl> impl_;
 };
 

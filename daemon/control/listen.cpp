@@ -23,7 +23,7 @@ Error system_error(const char* what, const std::string& path, int number) {
 }
 
 /// The folder must exist or be creatable, and nobody else may exchange the socket in it.
-Result<UniqueFd> open_folder(const std::string& folder, bool group_access) {
+Result<UniqueFd> open_folder(const std::string& folder, bool group_access, const SocketOwner& owner) {
   const mode_t mode = group_access ? 0750 : 0700;
   if (::mkdir(folder.c_str(), mode) != 0 && errno != EEXIST) {
     return system_error("cannot create folder", folder, errno);
@@ -36,8 +36,8 @@ Result<UniqueFd> open_folder(const std::string& folder, bool group_access) {
   if (!ours || ((status.st_mode & S_IWOTH) != 0 && !sticky)) {
     return make_error(Errc::kInvalidArgument,
                       "control socket: folder %.100s belongs to another user or anybody may write to it; remove it or "
-                      "set [control] socket",
-                      folder.c_str());
+                      "set %s",
+                      folder.c_str(), owner.setting);
   }
   return fd;
 }
@@ -53,7 +53,7 @@ Status lock_folder(int fd, const std::string& folder) {
 }
 
 /// Removes a socket that nobody listens on.
-Status remove_stale(const std::string& path, const sockaddr_un& address) {
+Status remove_stale(const std::string& path, const sockaddr_un& address, const SocketOwner& owner) {
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) {
     return errno == ENOENT ? Status() : Status(system_error("cannot look at", path, errno));
@@ -66,10 +66,8 @@ Status remove_stale(const std::string& path, const sockaddr_un& address) {
   // EAGAIN: somebody listens and has a full backlog. Only a refusal means that nobody is there.
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       (errno != ECONNREFUSED && errno != ENOENT)) {
-    return make_error(Errc::kRefused,
-                      "another embodyd answers on %.100s: stop it first (embodyctl shutdown) or give this one another "
-                      "[control] socket",
-                      path.c_str());
+    return make_error(Errc::kRefused, "another %s answers on %.100s: stop it first (%s) or give this one another %s",
+                      owner.program, path.c_str(), owner.how_to_end, owner.setting);
   }
   if (::unlink(path.c_str()) != 0 && errno != ENOENT) return system_error("cannot remove stale", path, errno);
   return {};
@@ -91,7 +89,7 @@ SocketFile::~SocketFile() {
   }
 }
 
-Result<Listener> listen_unix(const std::string& path, bool group_access) {
+Result<Listener> listen_unix(const std::string& path, bool group_access, const SocketOwner& owner) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path || path.front() != '/') {
@@ -102,10 +100,10 @@ Result<Listener> listen_unix(const std::string& path, bool group_access) {
   std::memcpy(address.sun_path, path.c_str(), path.size());
   const std::string folder = std::filesystem::path(path).parent_path().string();
 
-  auto lock = open_folder(folder, group_access);
+  auto lock = open_folder(folder, group_access, owner);
   if (!lock) return lock.error();
   if (const auto locked = lock_folder(lock->get(), folder); !locked) return locked.error();
-  if (const auto removed = remove_stale(path, address); !removed) return removed.error();
+  if (const auto removed = remove_stale(path, address, owner); !removed) return removed.error();
 
   UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   const mode_t mode = group_access ? 0660 : 0600;

@@ -30,8 +30,15 @@ struct Listener {
   SocketFile file;  // declared last: the file goes before the descriptor
 };
 
+/// Whose socket it is, for the sentences that say what is wrong.
+struct SocketOwner {
+  const char* program{"embodyd"};
+  const char* how_to_end{"embodyctl shutdown"};
+  const char* setting{"[control] socket"};  ///< that moves the socket elsewhere
+};
+
 /// See ControlServer::open. The probe for another daemon, the removal of a stale socket and the bind happen under a
 /// lock of the folder, so that of two daemons that start together one is refused.
-[[nodiscard]] Result<Listener> listen_unix(const std::string& path, bool group_access);
+[[nodiscard]] Result<Listener> listen_unix(const std::string& path, bool group_access, const SocketOwner& owner = {});
 
 }  // namespace embody::control

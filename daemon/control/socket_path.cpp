@@ -28,6 +28,11 @@ std::vector<std::string> personal_paths() {
 
 }  // namespace
 
+std::string personal_socket_path(const std::string& file) {
+  const auto runtime = environment("XDG_RUNTIME_DIR");
+  return (runtime.empty() ? "/tmp/embody-" + std::to_string(::geteuid()) : runtime + "/embody") + "/" + file;
+}
+
 std::string server_socket_path(const std::string& configured) {
   if (!configured.empty()) return configured;
   const auto unit = environment("RUNTIME_DIRECTORY");  // systemd: one folder, or several with colons

@@ -12,4 +12,7 @@ namespace embody::control {
 /// $XDG_RUNTIME_DIR/embody/control.sock, /tmp/embody-UID/control.sock and the system's /run/embody/control.sock.
 [[nodiscard]] std::string client_socket_path(const std::string& given);
 
+/// Where a program that a user starts by hand listens: $XDG_RUNTIME_DIR/embody/FILE, else /tmp/embody-UID/FILE.
+[[nodiscard]] std::string personal_socket_path(const std::string& file);
+
 }  // namespace embody::control

@@ -44,15 +44,15 @@ class Pass {
   /// `object` are its markers; null: poses in the world.
   void step(const MarkerFrame& frame, const std::array<Marker, 3>* object, TrajectoryRow& row,
             double* motors) noexcept {
-    const Duration t_start = thread_time();
+    const Duration t_start = evaluate::thread_time();
     const HandPose pose = pose_.step(frame);
     if (object != nullptr) see(*object);
-    const Duration t_pose = thread_time();
+    const Duration t_pose = evaluate::thread_time();
     fingers_.step(frame, pose, state_);
     if (use_filter_) filter_.step(state_);
-    const Duration t_fingers = thread_time();
+    const Duration t_fingers = evaluate::thread_time();
     mapping_.step(state_, target_);
-    const Duration t_embodiment = thread_time();
+    const Duration t_embodiment = evaluate::thread_time();
     times_.pose_us.push_back(in_us(t_pose - t_start));
     times_.fingers_us.push_back(in_us(t_fingers - t_pose));
     times_.embodiment_us.push_back(in_us(t_embodiment - t_fingers));

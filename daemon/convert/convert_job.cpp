@@ -64,6 +64,7 @@ Result<std::vector<Segment>> find_segments(const SegmentSource& source, const st
 std::vector<std::string> outputs_of(const ConvertJob& job, const std::vector<Segment>& segments) {
   if (segments.empty()) return {job.output};
   std::vector<std::string> outputs;
+  outputs.reserve(segments.size());
   for (const Segment& segment : segments) {
     outputs.push_back(segment_path(job.output, outputs.size() + 1, segment.label));
   }

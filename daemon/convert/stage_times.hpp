@@ -1,18 +1,10 @@
 #pragma once
 // CPU time that each stage of the data path took, frame by frame.
-#include <ctime>
 #include <vector>
 
-#include "core/base/time.hpp"
+#include "daemon/evaluate/samples.hpp"
 
 namespace embody::convert {
-
-/// CPU time of the calling thread. About 0.3 us.
-[[nodiscard]] inline Duration thread_time() noexcept {
-  timespec t{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return std::chrono::seconds(t.tv_sec) + std::chrono::nanoseconds(t.tv_nsec);
-}
 
 /// Microseconds of each frame.
 struct StageTimes {
@@ -24,9 +16,9 @@ struct StageTimes {
     for (auto* stage : {&pose_us, &fingers_us, &embodiment_us}) stage->reserve(frames);
   }
   void add(const StageTimes& other) {
-    pose_us.insert(pose_us.end(), other.pose_us.begin(), other.pose_us.end());
-    fingers_us.insert(fingers_us.end(), other.fingers_us.begin(), other.fingers_us.end());
-    embodiment_us.insert(embodiment_us.end(), other.embodiment_us.begin(), other.embodiment_us.end());
+    evaluate::append(pose_us, other.pose_us);
+    evaluate::append(fingers_us, other.fingers_us);
+    evaluate::append(embodiment_us, other.embodiment_us);
   }
 };
 

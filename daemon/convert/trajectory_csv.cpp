@@ -110,7 +110,10 @@ std::string format_csv(const Trajectory& trajectory, char separator) {
   std::string text;
   for (const auto& [key, value] : about(trajectory)) text += "# " + key + ": " + value + "\n";
   const std::vector<std::string> names = column_names(trajectory);
-  for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : std::string(1, separator)) + names[i];
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += separator;
+    text += names[i];
+  }
   text += '\n';
   text.reserve(text.size() + trajectory.rows.size() * names.size() * kBytesPerNumber);
   std::vector<double> values;

@@ -58,7 +58,7 @@ class CaptureRun {
         if (const Status served = driver->serve(now()); !served) return fail_device(served.error());
       }
       if (const Status written = writer_.status(); !written) return kExitFailed;  // told by close()
-      if (link.over()) return fail(make_error(Errc::kDisconnected, "the serial line is gone"), kExitUnavailable);
+      if (const Status there = link.status(); !there) return fail(there.error(), kExitUnavailable);
       print_line();
     }
     return kExitOk;
@@ -106,14 +106,18 @@ int capture_driver(const Options& options, CapturedDevice device, const config::
   return exit_code;
 }
 
-int capture_proxy(const Options& options, const CaptureLink& link, CaptureWriter& writer, StopSignals& signals) {
-  std::printf("Captures what passes here; put this into the configuration of embodyd, then start it:\n\n%s\n",
-              link.advice().c_str());
+/// Another program drives the device.
+int capture_others(const Options& options, const CaptureLink& link, CaptureWriter& writer, StopSignals& signals) {
+  std::printf("%s", link.advice().c_str());
   std::fflush(stdout);
   CaptureRun run(options, writer, signals);
   const int exit_code = run.run(link, nullptr, -1);
   if (const Status closed = writer.close(); !closed) return fail(closed.error(), kExitFailed);
   run.print_summary(nullptr);
+  if (exit_code == kExitOk && link.listens_only() && writer.counters().chunks == 0) {
+    return fail(make_error(Errc::kDisconnected, "no frame of the hand came by: does something drive it?"),
+                kExitUnavailable);
+  }
   return exit_code;
 }
 
@@ -134,8 +138,8 @@ int run(const Options& options, CapturedDevice device) {
     if (std::filesystem::is_regular_file(options.output, ignored)) std::filesystem::remove(options.output, ignored);
     return fail_device(link.error());
   }
-  return options.proxy ? capture_proxy(options, **link, **writer, signals)
-                       : capture_driver(options, device, *config, **link, **writer, signals);
+  return options.proxy || (*link)->listens_only() ? capture_others(options, **link, **writer, signals)
+                                                  : capture_driver(options, device, *config, **link, **writer, signals);
 }
 
 void add_device(CLI::App& capture, const char* name, const char* text, CapturedDevice device, CLI::App& app,
@@ -163,7 +167,8 @@ void add_capture_command(CLI::App& app, int& exit_code) {
   add_device(*capture, "tracker", "The tracker: connects and reads frames", CapturedDevice::kTracker, app, exit_code);
   add_device(*capture, "arm", "The arm: connects and reads states; sends no command, loads no program",
              CapturedDevice::kArm, app, exit_code);
-  add_device(*capture, "hand", "The robot hand: connects and asks for positions; sends nothing that moves",
+  add_device(*capture, "hand",
+             "The robot hand: connects and asks for positions; sends nothing that moves. On CAN: listens only",
              CapturedDevice::kHand, app, exit_code);
 }
 

@@ -1,5 +1,6 @@
 #include "daemon/ctl/capture_link.hpp"
 
+#include "daemon/ctl/capture_can.hpp"
 #include "drivers/capture/pty_proxy.hpp"
 #include "drivers/capture/tcp_proxy.hpp"
 #include "drivers/capture/udp_forwarder.hpp"
@@ -15,6 +16,11 @@ const std::string kLoopback = "127.0.0.1";
 
 std::string at(const std::string& host, int port) {
   return host + ":" + std::to_string(port);
+}
+
+/// The proxy's way of being captured: other addresses in the configuration.
+std::string configure(const std::string& lines) {
+  return "Captures what passes here; put this into the configuration of embodyd, then start it:\n\n" + lines + "\n";
 }
 
 /// `result` as a link, or its error.
@@ -39,7 +45,8 @@ class QtmLink final : public CaptureLink {
     return {};
   }
   [[nodiscard]] std::string advice() const override {
-    return "[tracker]\nhost = \"" + kLoopback + "\"\nport = " + std::to_string(port_) + "\ntransport = \"tcp\"\n";
+    return configure("[tracker]\nhost = \"" + kLoopback + "\"\nport = " + std::to_string(port_) +
+                     "\ntransport = \"tcp\"\n");
   }
 
  private:
@@ -47,30 +54,34 @@ class QtmLink final : public CaptureLink {
   std::uint16_t port_{0};
 };
 
-/// The arm's real-time port, and the one that takes the control program.
+/// The arm's real-time port, the one that takes the control program, and its dashboard.
 class ArmLink final : public CaptureLink {
  public:
   explicit ArmLink(CaptureWriter& writer) : proxy_(writer) {}
   Status open(config::ArmConfig& arm) {
-    const auto port = static_cast<std::uint16_t>(arm.port);
-    const auto program_port = static_cast<std::uint16_t>(arm.program.port);
-    if (const Status added = proxy_.forward(arm.host, port); !added) return added;
-    if (const Status added = proxy_.forward(arm.host, program_port); !added) return added;
+    for (int* port : {&arm.port, &arm.program.port, &arm.dashboard_port}) {
+      const auto device_port = static_cast<std::uint16_t>(*port);
+      if (const Status added = proxy_.forward(arm.host, device_port); !added) return added;
+      *port = proxy_.port_for(device_port);
+    }
     arm.host = kLoopback;
-    arm.port = port_ = proxy_.port_for(port);
-    arm.program.port = program_port_ = proxy_.port_for(program_port);
+    port_ = arm.port;
+    program_port_ = arm.program.port;
+    dashboard_port_ = arm.dashboard_port;
     proxy_.start();
     return {};
   }
   [[nodiscard]] std::string advice() const override {
-    return "[arm]\nhost = \"" + kLoopback + "\"\nport = " + std::to_string(port_) +
-           "\n[arm.program]\nport = " + std::to_string(program_port_) + "\n";
+    return configure("[arm]\nhost = \"" + kLoopback + "\"\nport = " + std::to_string(port_) +
+                     "\ndashboard_port = " + std::to_string(dashboard_port_) +
+                     "\n[arm.program]\nport = " + std::to_string(program_port_) + "\n");
   }
 
  private:
   capture::TcpProxy proxy_;
   int port_{0};
   int program_port_{0};
+  int dashboard_port_{0};
 };
 
 class SerialLink final : public CaptureLink {
@@ -81,8 +92,12 @@ class SerialLink final : public CaptureLink {
     hand.device = proxy_.device();
     return {};
   }
-  [[nodiscard]] std::string advice() const override { return "[hand]\ndevice = \"" + proxy_.device() + "\"\n"; }
-  [[nodiscard]] bool over() const override { return proxy_.over(); }
+  [[nodiscard]] std::string advice() const override {
+    return configure("[hand]\ndevice = \"" + proxy_.device() + "\"\n");
+  }
+  [[nodiscard]] Status status() const override {
+    return proxy_.over() ? Status(make_error(Errc::kDisconnected, "the serial line is gone")) : Status();
+  }
 
  private:
   capture::PtyProxy proxy_;
@@ -101,7 +116,7 @@ class LandmarkLink final : public CaptureLink {
     return {};
   }
   [[nodiscard]] std::string advice() const override {
-    return "[tracker.landmarks]\naddress = \"" + kLoopback + "\"\nport = " + std::to_string(port_) + "\n";
+    return configure("[tracker.landmarks]\naddress = \"" + kLoopback + "\"\nport = " + std::to_string(port_) + "\n");
   }
 
  private:
@@ -124,6 +139,9 @@ capture::Header link_header(CapturedDevice device, const config::EmbodyConfig& c
   if (device == CapturedDevice::kArm) {
     header.link = capture::LinkKind::kRtde;
     header.peer = at(config.arm.host, config.arm.port);
+  } else if (device == CapturedDevice::kHand && is_on_can(config.hand)) {
+    header.link = capture::LinkKind::kCan;
+    header.peer = can_peer(config.hand.mia);
   } else if (device == CapturedDevice::kHand) {
     header.link = capture::LinkKind::kSerial;
     header.peer = config.hand.device;
@@ -144,6 +162,10 @@ Result<std::unique_ptr<CaptureLink>> open_capture_link(CapturedDevice device, co
     const Status opened = link->open(config.arm);
     return link_or_error(std::move(link), opened);
   }
+  if (device == CapturedDevice::kHand && config.hand.driver == config::HandDriverKind::kJointState) {
+    return make_error(Errc::kUnsupported, "a hand with [hand] driver \"joint_state\" has no link but its DDS topics");
+  }
+  if (device == CapturedDevice::kHand && is_on_can(config.hand)) return listen_on_can(config.hand.mia, writer);
   if (device == CapturedDevice::kHand) {
     auto link = std::make_unique<SerialLink>(writer);
     const Status opened = link->open(config.hand);

@@ -1,5 +1,5 @@
 #pragma once
-// The proxy that stands on the link of a configured device while it is captured.
+// What stands on the link of a configured device, or listens beside it, while it is captured.
 #include <memory>
 #include <string>
 
@@ -19,18 +19,21 @@ class CaptureLink {
   CaptureLink(const CaptureLink&) = delete;
   CaptureLink& operator=(const CaptureLink&) = delete;
 
-  /// Lines for the configuration of a program whose link is to be captured.
+  /// What a person has to do so that another program's link is captured.
   [[nodiscard]] virtual std::string advice() const = 0;
-  /// Nothing more will come: a serial line is gone.
-  [[nodiscard]] virtual bool over() const { return false; }
+  /// A bus, to which a second driver would be a second master: no driver of ours is connected, and the configuration
+  /// stays as it is.
+  [[nodiscard]] virtual bool listens_only() const { return false; }
+  /// Errors: kDisconnected, nothing more will come.
+  [[nodiscard]] virtual Status status() const { return {}; }
 
  protected:
   CaptureLink() = default;
 };
 
 /// Opens the proxy, and changes `config` so that the drivers made from it connect to the proxy instead of the device.
-/// Nothing is sent to the device. `writer` must outlive the link. Errors: those of TcpProxy::forward(),
-/// PtyProxy::open() and UdpForwarder::open().
+/// Nothing is sent to the device. `writer` must outlive the link. Errors: kUnsupported (a hand without a link of ours),
+/// those of TcpProxy::forward(), PtyProxy::open(), UdpForwarder::open() and open_can().
 [[nodiscard]] Result<std::unique_ptr<CaptureLink>> open_capture_link(CapturedDevice device,
                                                                      config::EmbodyConfig& config,
                                                                      capture::CaptureWriter& writer);

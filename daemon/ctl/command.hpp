@@ -34,8 +34,10 @@ void add_capture_command(CLI::App& app, int& exit_code);
 void add_discover_command(CLI::App& app, int& exit_code);
 /// arm: power, brakes and stops of the robot arm.
 void add_arm_command(CLI::App& app, int& exit_code);
-/// hand: calibration or activation of the robot hand.
+/// hand: calibration, activation, tare and readings of the robot hand.
 void add_hand_command(CLI::App& app, int& exit_code);
+/// sim: faults in a running simulated lab.
+void add_sim_command(CLI::App& app, int& exit_code);
 /// onboard: a hand file for any URDF.
 void add_onboard_command(CLI::App& app, int& exit_code);
 

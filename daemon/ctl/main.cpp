@@ -22,6 +22,7 @@ constexpr std::array kCommands{
     embody::ctl::Command{&embody::ctl::add_discover_command},
     embody::ctl::Command{&embody::ctl::add_arm_command},
     embody::ctl::Command{&embody::ctl::add_hand_command},
+    embody::ctl::Command{&embody::ctl::add_sim_command},
 };
 
 constexpr const char* kFooter =

@@ -127,6 +127,40 @@ void add_latency(Table& table, const json& latency) {
   }
 }
 
+/// Counters of a device that have counted anything.
+void add_device_counters(Table& table, const json& devices) {
+  if (!devices.is_object()) return;
+  for (const auto& [name, device] : devices.items()) {
+    const json& all = member(device, "counters");
+    if (!all.is_object()) continue;
+    json counted = json::object();
+    for (const auto& [counter, value] : all.items()) {
+      if (value != 0) counted[counter] = value;
+    }
+    table.pairs(" " + printable(name), counted, "");  // below "counters"
+  }
+}
+
+/// What the robot hand measures. Raw numbers have no unit that anybody documents.
+void add_hand(Table& table, const json& hand) {
+  if (!hand.is_object() || hand.empty()) return;
+  std::string text = text_of(member(hand, "condition")) + ", supply " + text_of(member(hand, "supply"));
+  if (const json& why = member(hand, "why_not"); why.is_string() && why != "") text += ": " + text_of(why);
+  table.line("hand", text);
+  if (const json& peer = member(hand, "peer"); peer.is_string()) table.line("hand", text_of(peer));
+  table.pairs("positions", member(hand, "position_rad"), " rad");
+  table.pairs("currents", member(hand, "current_a"), " A");
+  table.pairs("currents", member(hand, "current_raw"), " (raw)");
+  const json& force = member(hand, "force_raw");
+  if (!force.is_object() || force.empty()) return;
+  std::string forces;
+  for (const auto& [finger, value] : force.items()) {
+    forces +=
+        printable(finger) + " " + text_of(member(value, "normal")) + "/" + text_of(member(value, "tangential")) + "   ";
+  }
+  table.line("forces", forces + "(raw, normal/tangential)");
+}
+
 /// Delay of each finger now, between which limits it moves, and what is predicted.
 void add_filter(Table& table, const json& filter) {
   if (!filter.is_object()) return;
@@ -180,22 +214,30 @@ std::string status_table(const std::string& json_text) {
   add_filter(table, member(status, "filter"));
   table.pairs("confidence", member(status, "confidence"), "");
   table.pairs("quality", member(status, "quality"), "");
+  add_hand(table, member(status, "hand"));
   table.pairs("robot hand", member(status, "robot_hand"), "");
   table.pairs("tracking", member(status, "tracking"), "");
   add_latency(table, member(status, "latency_us"));
   add_realtime(table, member(status, "realtime"));
   table.pairs("landmarks", member(status, "landmarks"), "");
   table.pairs("counters", member(status, "counters"), "");
+  add_device_counters(table, member(status, "devices"));
 
   static const std::set<std::string> kKnown{
       "version",  "uptime_s",           "mode",     "devices", "rates_hz",  "counters", "latency_us",
       "realtime", "marker_residual_mm", "tracking", "robot",   "landmarks", "filter",   "confidence",
-      "quality",  "robot_hand"};
+      "quality",  "robot_hand",         "hand"};
   json others = json::object();
   for (const auto& [key, value] : status.items()) {
     if (kKnown.count(key) == 0) others[key] = value;
   }
   table.pairs("other", others, "");
+  return table.text();
+}
+
+std::string hand_table(const std::string& json_text) {
+  Table table;
+  add_hand(table, json::parse(json_text, nullptr, false));
   return table.text();
 }
 

@@ -89,11 +89,15 @@ struct State {
 
 /// Written by Cyclone's receive thread, read by the owner of the driver.
 struct Inbox {
+  explicit Inbox(JointStateHandCounters& all) : counters(all) {}
+
+  static constexpr std::size_t kNoneMissing = ~std::size_t{0};
+  JointStateHandCounters& counters;
   std::vector<std::string> joints;
   transport::UniqueFd wake;
   Latest<State> latest;
-  std::atomic<std::uint64_t> states{0}, partial{0}, broken{0}, repeated{0};
-  std::atomic<std::size_t> missing{0};
+  std::atomic<bool> seen{false};                   ///< a whole state has come
+  std::atomic<std::size_t> missing{kNoneMissing};  ///< the joint that the last partial message lacked
   std::uint64_t number{0};
   std::int64_t last_stamp_ns{0};
 
@@ -105,10 +109,10 @@ struct Inbox {
         return;
       case JointStateMatch::kPartial:
         missing.store(matched.missing, std::memory_order_relaxed);
-        partial.fetch_add(1, std::memory_order_release);
+        ++counters.partial;
         return;
       case JointStateMatch::kBroken:
-        broken.fetch_add(1, std::memory_order_relaxed);
+        ++counters.broken;
         return;
       case JointStateMatch::kWhole:
         break;
@@ -118,11 +122,12 @@ struct Inbox {
     const bool again = stamp_ns != 0 && stamp_ns == last_stamp_ns;
     last_stamp_ns = stamp_ns;
     if (again) {
-      repeated.fetch_add(1, std::memory_order_relaxed);
+      ++counters.repeated;
       return;
     }
     latest.publish({matched.q_rad, now, ++number});
-    states.fetch_add(1, std::memory_order_relaxed);
+    ++counters.states;
+    seen.store(true, std::memory_order_relaxed);
     const std::uint64_t one = 1;
     static_cast<void>(!::write(wake.get(), &one, sizeof one));
   }
@@ -146,7 +151,7 @@ void on_data(dds_entity_t reader, void* argument) {
 
 class JointStateHand::Session {
  public:
-  Session() = default;
+  explicit Session(JointStateHandCounters& counters) : inbox(counters) {}
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session() {
@@ -244,13 +249,13 @@ Status JointStateHand::Session::wait_for_other_end(const JointStateHandConfig& c
     pollfd entry{inbox.wake.get(), POLLIN, 0};
     const timespec pause{0, kLook.count()};
     if (!seen || !has_listener()) ::ppoll(seen ? nullptr : &entry, seen ? 0 : 1, &pause, nullptr);
-    seen = inbox.states.load(std::memory_order_relaxed) > 0;
+    seen = inbox.seen.load(std::memory_order_relaxed);
   }
   if (seen && has_listener()) return {};
-  if (!seen && inbox.partial.load(std::memory_order_acquire) > 0)
+  const std::size_t missing = inbox.missing.load(std::memory_order_relaxed);
+  if (!seen && missing != Inbox::kNoneMissing)
     return make_error(Errc::kTimeout, "the joint states on %.60s lack '%s' of the hand file",
-                      config.state_topic.c_str(),
-                      inbox.joints[std::min(inbox.missing.load(), inbox.joints.size() - 1)].c_str());
+                      config.state_topic.c_str(), inbox.joints[std::min(missing, inbox.joints.size() - 1)].c_str());
   if (!seen)
     return make_error(Errc::kTimeout, "no joint states of the hand on %.60s: does its driver run, in DDS domain %d?",
                       config.state_topic.c_str(), config.domain);
@@ -258,7 +263,16 @@ Status JointStateHand::Session::wait_for_other_end(const JointStateHandConfig& c
                     config.command_topic.c_str());
 }
 
-JointStateHand::JointStateHand(JointStateHandConfig config) : config_(std::move(config)) {}
+JointStateHand::JointStateHand(JointStateHandConfig config) : config_(std::move(config)) {
+  show({{"states", &counters_.states},
+        {"partial", &counters_.partial},
+        {"broken", &counters_.broken},
+        {"repeated", &counters_.repeated},
+        {"commands", &counters_.commands},
+        {"stops", &counters_.stops},
+        {"throttled", &counters_.throttled},
+        {"failed", &counters_.failed}});
+}
 
 JointStateHand::~JointStateHand() {
   if (!lost_ && moved_ && !latched_) publish_stop();
@@ -266,11 +280,10 @@ JointStateHand::~JointStateHand() {
 
 Result<HandInfo> JointStateHand::connect() {
   if (!lost_ && moved_ && !latched_) publish_stop();
-  counters_ = counters();  // of the session that ends
   session_.reset();
   lost_ = true;
   if (const Status usable = check(config_); !usable) return usable.error();
-  auto session = std::make_unique<Session>();
+  auto session = std::make_unique<Session>(counters_);
   if (const Status opened = session->open(config_); !opened) return opened.error();
   if (const Status there = session->wait_for_other_end(config_); !there) return there.error();
   session_ = std::move(session);
@@ -315,6 +328,11 @@ IoStatus JointStateHand::read(HandDeviceState& state) noexcept {
   state.t_arrival = session_->last.t_arrival;
   state.joint_count = config_.joints.size();
   std::copy_n(session_->last.q_rad.begin(), state.joint_count, state.q_rad.begin());
+  state.telemetry = {};  // the hand's own driver knows more, and has its own topics
+  if (latched_ && !hold_seen_) {
+    state.telemetry.condition = HandCondition::kStopped;
+    state.telemetry.why_not = "the hand was stopped: hold first";
+  }
   return IoStatus::kDone;
 }
 
@@ -366,17 +384,6 @@ void JointStateHand::publish_stop() noexcept {
   const auto written = session_->publish({session_->last.q_rad.data(), config_.joints.size()});
   ++(written == DDS_RETCODE_OK ? counters_.stops : counters_.failed);
   if (written == DDS_RETCODE_OK) ++counters_.commands;
-}
-
-JointStateHandCounters JointStateHand::counters() const noexcept {
-  JointStateHandCounters counters = counters_;
-  if (!session_) return counters;
-  const Inbox& inbox = session_->inbox;
-  counters.states += inbox.states.load(std::memory_order_relaxed);
-  counters.partial += inbox.partial.load(std::memory_order_relaxed);
-  counters.broken += inbox.broken.load(std::memory_order_relaxed);
-  counters.repeated += inbox.repeated.load(std::memory_order_relaxed);
-  return counters;
 }
 
 }  // namespace embody::dds

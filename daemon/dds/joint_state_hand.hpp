@@ -22,14 +22,14 @@ struct JointStateHandConfig {
 
 /// What happened since the object was made.
 struct JointStateHandCounters {
-  std::uint64_t states{0};     ///< whole ones
-  std::uint64_t partial{0};    ///< messages with some of our joints
-  std::uint64_t broken{0};     ///< messages with impossible positions
-  std::uint64_t repeated{0};   ///< whole ones with the time stamp of the last: the sender's source stands still
-  std::uint64_t commands{0};   ///< handed to DDS
-  std::uint64_t stops{0};      ///< of these: the position at a stop
-  std::uint64_t throttled{0};  ///< commands dropped because they came faster than rate_hz
-  std::uint64_t failed{0};     ///< commands that DDS did not take
+  Counter states;     ///< whole ones
+  Counter partial;    ///< messages with some of our joints
+  Counter broken;     ///< messages with impossible positions
+  Counter repeated;   ///< whole ones with the time stamp of the last: the sender's source stands still
+  Counter commands;   ///< handed to DDS
+  Counter stops;      ///< of these: the position at a stop
+  Counter throttled;  ///< commands dropped because they came faster than rate_hz
+  Counter failed;     ///< commands that DDS did not take
 };
 
 /// What the other end must do itself, because nothing here can:
@@ -63,7 +63,7 @@ class JointStateHand final : public HandDriver {
   IoStatus read(HandDeviceState& state) noexcept override;
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override;
 
-  [[nodiscard]] JointStateHandCounters counters() const noexcept;
+  [[nodiscard]] const JointStateHandCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] bool stopped() const noexcept { return latched_; }
 
  private:
@@ -76,7 +76,7 @@ class JointStateHand final : public HandDriver {
 
   JointStateHandConfig config_;
   JointStateHandCounters counters_;
-  std::unique_ptr<Session> session_;  ///< empty: no session
+  std::unique_ptr<Session> session_;  ///< empty: no session; counts in counters_, and so goes before it
   bool lost_{true};
   bool latched_{false};
   bool hold_seen_{false};

@@ -134,7 +134,7 @@ class DdsPublisher::Impl {
     return {published_.load(std::memory_order_relaxed), failed_.load(std::memory_order_relaxed)};
   }
 
-  dds_entity_t joint_states{0}, hand_pose{0}, hand_state{0}, markers{0}, status{0};
+  dds_entity_t joint_states{0}, hand_pose{0}, hand_state{0}, hand_telemetry{0}, markers{0}, status{0};
   std::size_t filtered_sockets{0};
 
  private:
@@ -188,6 +188,7 @@ Status DdsPublisher::Impl::open_writers(const DdsConfig& config) {
   } outputs[] = {{joint_states, side + "/joint_states", sensor_msgs_msg_dds__JointState__desc},
                  {hand_pose, side + "/hand_pose", geometry_msgs_msg_dds__PoseStamped__desc},
                  {hand_state, side + "/hand_state", embody_msgs_msg_dds__HandState__desc},
+                 {hand_telemetry, side + "/hand_telemetry", embody_msgs_msg_dds__HandTelemetry__desc},
                  {markers, side + "/markers", embody_msgs_msg_dds__Markers__desc},
                  {status, "rt/embody/status", embody_msgs_msg_dds__Status__desc}};
   for (const auto& output : outputs) {
@@ -267,6 +268,41 @@ bool DdsPublisher::publish_hand_state(const HandState& hand) {
   sample.hand_confidence = hand.hand_confidence;
   sample.valid = hand.valid;
   return impl_->write(impl_->hand_state, &sample);
+}
+
+bool DdsPublisher::publish_hand_telemetry(const HandDeviceState& hand, std::span<const std::string> joints) {
+  if (!impl_) return false;
+  if (hand.joint_count != joints.size() || joints.size() > kMaxHandJoints) return impl_->count(false);
+  const HandTelemetry& telemetry = hand.telemetry;
+  Names names(joints.size());
+  std::transform(joints.begin(), joints.end(), names.begin(), c_text);
+  std::vector<double> current;
+  if (telemetry.t_current != TimePoint{}) {
+    const std::size_t count = std::min(telemetry.current_count, kMaxHandCurrents);
+    for (std::size_t i = 0; i < count; ++i) {
+      current.push_back(telemetry.current_in_ampere ? telemetry.current_a[i] : telemetry.current_raw[i]);
+    }
+  }
+  const std::span<const double> none;
+  std::vector<embody_msgs_msg_dds__RawForce_> force;
+  for (std::size_t i = 0; telemetry.t_force != TimePoint{} && i < kMaxHandFingers; ++i) {
+    const RawForce& f = telemetry.force[i];
+    if (f.measured) force.push_back({static_cast<std::uint8_t>(i), f.normal, f.tangential});
+  }
+  const std::string why_not(telemetry.why_not.view());
+  const std::string condition = kHandConditionNames[static_cast<std::size_t>(telemetry.condition)];
+  const std::string supply = kHandSupplyNames[static_cast<std::size_t>(telemetry.supply)];
+  const embody_msgs_msg_dds__HandTelemetry_ sample{
+      to_wall_time(hand.t_arrival).time_since_epoch().count(),
+      c_text(condition),
+      c_text(why_not),
+      c_text(supply),
+      borrow<dds_sequence_string>(names),
+      to_message({hand.q_rad.data(), hand.joint_count}),
+      to_message(telemetry.current_in_ampere ? std::span<const double>(current) : none),
+      to_message(telemetry.current_in_ampere ? none : std::span<const double>(current)),
+      borrow<dds_sequence_embody_msgs_msg_dds__RawForce_>(force)};
+  return impl_->write(impl_->hand_telemetry, &sample);
 }
 
 bool DdsPublisher::publish_markers(const MarkersSample& markers) {

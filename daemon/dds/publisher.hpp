@@ -1,5 +1,5 @@
 #pragma once
-// What embodyd shows on DDS: five topics with ROS 2-compatible names and types (docs/dds.md). Observation only: nothing
+// What embodyd shows on DDS: six topics with ROS 2-compatible names and types (docs/dds.md). Observation only: nothing
 // is ever read from the network. Call everything from a normal (SCHED_OTHER) thread: creating the publisher starts
 // Cyclone's threads, which inherit the caller's scheduling, and publishing allocates.
 #include <chrono>
@@ -107,6 +107,8 @@ class DdsPublisher {
   /// Stamps of `hand` are mapped to the wall clock here.
   bool publish_hand_state(const HandState& hand);
   bool publish_markers(const MarkersSample& sample);
+  /// What the robot hand measures; `joints` names its motors.
+  bool publish_hand_telemetry(const HandDeviceState& hand, std::span<const std::string> joints);
   bool publish_status(const StatusSample& status);
 
   [[nodiscard]] Counters counters() const noexcept;

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "core/hand/hand_pose_estimator.hpp"
 #include "daemon/evaluate/print.hpp"
+#include "daemon/evaluate/samples.hpp"
 
 namespace embody::evaluate {
 namespace {
@@ -13,17 +13,6 @@ namespace {
 constexpr double kCostly = 1.01;
 constexpr double kLeastCost_m2 = 1e-9;
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
-
-double thread_time_us() noexcept {
-  timespec t{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
-}
-
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
-}
 
 std::optional<double> scaled(std::optional<double> value, double factor) {
   if (value) *value *= factor;
@@ -104,9 +93,9 @@ EmbodimentSamples evaluate_embodiment(const EmbodimentMapping& mapping, const st
     EmbodimentMapping timed = mapping;
     times_us.reserve(states.size());
     for (const HandState& state : states) {
-      const double t_us = thread_time_us();
+      const Duration t_start = thread_time();
       timed.step(state, target);
-      times_us.push_back(thread_time_us() - t_us);
+      times_us.push_back(1e6 * to_seconds(thread_time() - t_start));
     }
   }
   return samples;

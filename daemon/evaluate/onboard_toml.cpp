@@ -58,6 +58,7 @@ std::string list(const Eigen::Vector3d& v) {
 
 std::string list(const std::vector<std::string>& names) {
   std::vector<std::string> items;
+  items.reserve(names.size());
   for (const std::string& name : names) items.push_back(quoted(name));
   return array(items);
 }
@@ -65,6 +66,7 @@ std::string list(const std::vector<std::string>& names) {
 /// Inner bounds of the range, so that rounding never leaves the URDF's limits.
 std::vector<double> rounded(const std::vector<double>& values, bool up) {
   std::vector<double> out;
+  out.reserve(values.size());
   for (const double v : values) out.push_back((up ? std::ceil(1e6 * v - 1e-3) : std::floor(1e6 * v + 1e-3)) / 1e6);
   return out;
 }

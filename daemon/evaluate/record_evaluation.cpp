@@ -1,10 +1,10 @@
 #include "daemon/evaluate/record_evaluation.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <optional>
 
 #include "core/hand/hand_pose_estimator.hpp"
+#include "daemon/evaluate/samples.hpp"
 
 namespace embody::evaluate {
 namespace {
@@ -17,17 +17,6 @@ constexpr double kStill_m = 0.0001;
 constexpr double kLeastCost_m2 = 1e-9;
 constexpr int kReferenceEvaluations = 5000;
 constexpr double kReferenceTolerance = 1e-14;
-
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
-}
-
-double thread_time_us() noexcept {
-  timespec t{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
-}
 
 bool seen(const MarkerFrame& frame, std::size_t slot) noexcept {
   return slot < frame.count && frame.markers[slot].visible && frame.markers[slot].p_W.allFinite();
@@ -185,9 +174,9 @@ std::vector<double> time_run(const OperatorModels& models, const hand::GloveLayo
   HandState state;
   for (const MarkerFrame& frame : frames) {
     const HandPose pose = pose_estimator.step(frame);
-    const double t_us = thread_time_us();
+    const Duration t_start = thread_time();
     fingers.step(frame, pose, state);
-    times_us.push_back(thread_time_us() - t_us);
+    times_us.push_back(1e6 * to_seconds(thread_time() - t_start));
   }
   return times_us;
 }

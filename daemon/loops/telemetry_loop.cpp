@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <utility>
 
 #include "core/robot/ur_kinematics.hpp"
 #include "drivers/transport/clock.hpp"
@@ -12,6 +13,7 @@ namespace embody {
 namespace {
 
 constexpr auto kMarkersPeriod = std::chrono::milliseconds(100);
+constexpr auto kHandPeriod = std::chrono::milliseconds(100);
 constexpr auto kRelaxed = std::memory_order_relaxed;
 constexpr std::array<const char*, 6> kArmJoints{"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
                                                 "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
@@ -36,6 +38,7 @@ void TelemetryLoop::run() {
     measure_rates(transport::now());
     log_mode();
     log_hand_hold();
+    log_hand_condition();
     publish(transport::now());
     const std::lock_guard lock(mutex_);
     shared_ = data_;
@@ -146,6 +149,22 @@ void TelemetryLoop::log_hand_hold() {
   unsure_ = unsure;
 }
 
+/// What only a person at the hand can change is said once.
+void TelemetryLoop::log_hand_condition() {
+  const HandTelemetry& telemetry = data_.hand.telemetry;
+  if (std::exchange(logged_condition_, telemetry.condition) == telemetry.condition) return;
+  switch (telemetry.condition) {
+    case HandCondition::kNotActivated:
+    case HandCondition::kRestarted:
+    case HandCondition::kFault:
+      return spdlog::warn("the robot hand does not move: {}", telemetry.why_not.view());
+    case HandCondition::kNoReadings:
+      return spdlog::warn("the robot hand moves, but tells no currents or forces");
+    default:
+      break;
+  }
+}
+
 void TelemetryLoop::publish(TimePoint now) {
   if (new_arm_ && data_.arm.package > 0) publish_joint_states();
   if (new_pose_) {
@@ -153,6 +172,11 @@ void TelemetryLoop::publish(TimePoint now) {
     if (pose.valid) publisher_.publish_hand_pose(pose.X_WM, "mocap", to_wall_time(pose.t_capture));
   }
   if (new_fingers_) publisher_.publish_hand_state(fingers_.state);
+  if (data_.hand.reply > 0 && data_.hand.reply != published_reply_ && now - t_telemetry_ >= kHandPeriod) {
+    publisher_.publish_hand_telemetry(data_.hand, hand_.motor_names());
+    published_reply_ = data_.hand.reply;
+    t_telemetry_ = now;
+  }
   if (data_.markers.frame_number != published_markers_) publish_markers();
   if (now - t_status_ > std::chrono::milliseconds(200)) {
     publish_status();

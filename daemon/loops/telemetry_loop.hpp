@@ -64,6 +64,7 @@ class TelemetryLoop {
   void measure_rates(TimePoint now);
   void log_mode();
   void log_hand_hold();
+  void log_hand_condition();
   void publish(TimePoint now);
   void publish_joint_states();
   void publish_status();
@@ -90,6 +91,9 @@ class TelemetryLoop {
   std::array<std::uint64_t, 4> rate_counts_{};
   TimePoint t_status_{};
   TimePoint t_markers_{};
+  TimePoint t_telemetry_{};  ///< of the hand, published last
+  std::uint64_t published_reply_{0};
+  HandCondition logged_condition_{HandCondition::kUnknown};
   std::uint64_t published_markers_{0};
   bool unsure_{false};
 

@@ -114,17 +114,17 @@ void judge_arm(const std::vector<TargetSample>& targets, const std::vector<Actua
   }
 }
 
-void judge_hand(const std::vector<TargetSample>& targets, const std::vector<MiaSample>& hand, TimePoint begin,
+void judge_hand(const std::vector<TargetSample>& targets, const std::vector<HandSample>& hand, TimePoint begin,
                 TimePoint end, const FollowCriteria& criteria, FollowReport& report) {
   report.hand_error_rad = std::numeric_limits<double>::infinity();
   std::vector<double> errors;
   for (Duration lag{0}; lag <= criteria.largest_lag; lag += kLagStep) {
     errors.clear();
-    for (const MiaSample& sample : hand) {
+    for (const HandSample& sample : hand) {
       if (sample.t < begin || sample.t > end) continue;
       const TargetSample target = target_at(targets, sample.t - lag);
       double error = 0.0;
-      for (std::size_t k = 0; k < sample.q_rad.size(); ++k) {
+      for (std::size_t k = 0; k < sample.count; ++k) {
         error = std::max(error, std::abs(sample.q_rad[k] - target.q_hand_rad[k]));
       }
       errors.push_back(error);
@@ -198,7 +198,7 @@ std::vector<TargetSample> ungated_targets(const Models& models, const recording:
 }
 
 FollowReport judge(const std::vector<TargetSample>& targets, const std::vector<UrSample>& arm,
-                   const std::vector<MiaSample>& hand, const FollowCriteria& criteria) {
+                   const std::vector<HandSample>& hand, const FollowCriteria& criteria) {
   FollowReport report;
   if (targets.empty()) {
     report.reason = "no frame was sent";

@@ -6,7 +6,6 @@
 
 #include "daemon/app/models.hpp"
 #include "drivers/recording/recording.hpp"
-#include "drivers/sim/mia/mia_simulator.hpp"
 #include "drivers/sim/qtm/qtm_server.hpp"
 #include "drivers/sim/ur/ur_controller.hpp"
 
@@ -50,11 +49,18 @@ struct TargetSample {
   std::array<double, kMaxHandJoints> q_hand_rad{};
 };
 
+/// Where the plant of the robot hand was, in the order of the hand file's motors.
+struct HandSample {
+  TimePoint t{};
+  std::size_t count{0};  ///< motors
+  std::array<double, kMaxHandJoints> q_rad{};
+};
+
 /// Runs the models over the recording's frames that were sent.
 [[nodiscard]] std::vector<TargetSample> ungated_targets(const Models& models, const recording::Recording& recording,
                                                         const std::vector<SentFrame>& sent);
 
 [[nodiscard]] FollowReport judge(const std::vector<TargetSample>& targets, const std::vector<UrSample>& arm,
-                                 const std::vector<MiaSample>& hand, const FollowCriteria& criteria = {});
+                                 const std::vector<HandSample>& hand, const FollowCriteria& criteria = {});
 
 }  // namespace embody::sim

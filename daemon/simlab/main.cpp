@@ -1,12 +1,9 @@
-// embody-sim: the simulated lab. Events go to standard output and commands come from standard input, one per line, so
-// that a demo, a test or a person can drive it.
-#include <poll.h>
-
+// embody-sim: the simulated lab.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <csignal>
-#include <fstream>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/hand/synthetic_motion.hpp"
@@ -16,6 +13,7 @@
 #include "daemon/control/exit_code.hpp"
 #include "daemon/simlab/demo_recording.hpp"
 #include "daemon/simlab/lab.hpp"
+#include "daemon/simlab/lab_run.hpp"
 #include "daemon/simlab/landmark_sender.hpp"
 #include "drivers/recording/tsv_recording.hpp"
 
@@ -25,7 +23,7 @@ using namespace embody;
 using nlohmann::json;
 
 void say(const json& event) {
-  std::cout << event.dump() << std::endl;
+  std::cout << event.dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
 }
 
 int fail(const Error& error) {
@@ -40,88 +38,23 @@ int fail(const Error& error) {
   }
 }
 
-/// Waits for lines on standard input; keeps what follows the last newline.
-class Commands {
- public:
-  /// Complete lines so far; false at the end of the input.
-  bool read(std::vector<std::string>& lines) {
-    char chunk[512];
-    const ssize_t size = ::read(STDIN_FILENO, chunk, sizeof chunk);
-    if (size <= 0) return false;
-    text_.append(chunk, static_cast<std::size_t>(size));
-    for (std::size_t end = text_.find('\n'); end != std::string::npos; end = text_.find('\n')) {
-      lines.push_back(text_.substr(0, end));
-      text_.erase(0, end + 1);
-    }
-    if (text_.size() > 4096) text_.clear();
-    return true;
-  }
-
- private:
-  std::string text_;
+struct RunOptions {
+  std::string config_file;
+  sim::LabConfig lab;
+  sim::LabRunOptions run;
 };
 
-void obey(sim::Lab& lab, const std::string& line, bool& quit) {
-  if (line == "play") return lab.play();
-  if (line == "quit") {
-    quit = true;
-  } else if (line == "report") {
-    say({{"event", "report"}, {"report", json::parse(lab.report_json())}});
-  } else if (!line.empty()) {
-    if (const Status status = lab.fault(line); !status) {
-      say({{"event", "error"}, {"message", status.error().detail.view()}});
-    } else {
-      say({{"event", "fault"}, {"fault", line}});
-    }
-  }
-}
-
-int run(sim::Lab& lab, StopSignals& signals, bool wait_for_play) {
-  say({{"event", "ready"},
-       {"qtm_port", lab.qtm_port()},
-       {"ur_port", lab.ur().port()},
-       {"ur_primary_port", lab.ur().primary_port()},
-       {"ur_dashboard_port", lab.ur().dashboard_port()},
-       {"mia_device", lab.mia_device()},
-       {"frames", lab.frame_count()},
-       {"rate_hz", lab.rate_hz()}});
-  Commands commands;
-  bool in_use = false;
-  bool finished = false;
-  bool quit = false;
-  bool input_open = true;
-  while (!quit) {
-    pollfd entries[2] = {{signals.fd(), POLLIN, 0}, {input_open ? STDIN_FILENO : -1, POLLIN, 0}};
-    ::poll(entries, 2, in_use && !finished ? 2 : 20);
-    if (signals.take() != 0) break;
-    std::vector<std::string> lines;
-    if (entries[1].revents != 0) input_open = commands.read(lines);
-    for (const std::string& line : lines) obey(lab, line, quit);
-    if (!in_use && lab.all_devices_in_use()) {
-      in_use = true;
-      say({{"event", "devices_in_use"}});
-      if (!wait_for_play) lab.play();
-    }
-    if (!finished && lab.finished()) {
-      finished = true;
-      say({{"event", "playback_finished"}});
-    }
-  }
-  signals.restore();
-  say({{"event", "report"}, {"report", json::parse(lab.report_json())}});
-  return kExitOk;
-}
-
-int run_lab(const std::string& config_file, const sim::LabConfig& lab_config, bool wait_for_play) {
+int run_lab(const RunOptions& options) {
   StopSignals signals;
-  const Result<std::filesystem::path> path = config::find_config(config_file);
+  const Result<std::filesystem::path> path = config::find_config(options.config_file);
   if (!path) return fail(path.error());
   const Result<config::EmbodyConfig> config = config::load_config(*path);
   if (!config) return fail(config.error()), kExitConfiguration;
-  Result<std::unique_ptr<sim::Lab>> lab = sim::Lab::create(*config, lab_config);
+  Result<std::unique_ptr<sim::Lab>> lab = sim::Lab::create(*config, options.lab);
   if (!lab) return fail(lab.error());
   if (const Status status = (*lab)->start(); !status) return fail(status.error());
-  return run(**lab, signals, wait_for_play);
+  const Status ended = sim::run_lab(**lab, signals, options.run);
+  return ended ? kExitOk : fail(ended.error());
 }
 
 int generate(const std::string& output, double duration_s, std::uint64_t seed) {
@@ -180,26 +113,42 @@ void add_landmark_options(CLI::App& command, LandmarkOptions& options) {
   command.add_flag("--loop", options.sender.loop, "Begin again after the last frame, until a signal");
 }
 
+void add_run_options(CLI::App& command, RunOptions& options) {
+  sim::LabConfig& lab = options.lab;
+  command.add_option("recording", lab.recording, "QTM export (TSV) to play")->required();
+  command.add_option("--config", options.config_file,
+                     "Configuration of the cell, the hand and the models (as embodyd)");
+  command.add_option("--duration", lab.duration_s, "Play only so many seconds")->check(CLI::PositiveNumber);
+  command.add_flag("--loop", lab.loop, "Begin again after the last frame, for ever");
+  command.add_option("--address", lab.address, "IPv4 address to listen on")->capture_default_str();
+  command.add_option("--qtm-port", lab.qtm_port, "TCP port of the QTM server; 0 takes a free one");
+  command.add_option("--ur-port", lab.ur_port, "TCP port of the UR controller; 0 takes a free one");
+  command.add_option("--ur-primary-port", lab.ur_primary_port, "TCP port in place of the controller's 30001");
+  command.add_option("--ur-dashboard-port", lab.ur_dashboard_port, "TCP port in place of the controller's 29999");
+  command.add_option("--mia-link,--hand-link", lab.mia_link, "Create a symlink to the hand's pseudo-terminal here");
+  const std::map<std::string, mia::Generation> generations{{"acknowledging", mia::Generation::kAcknowledging},
+                                                           {"streaming", mia::Generation::kStreaming}};
+  command
+      .add_option_function<std::string>(
+          "--mia-protocol", [&lab, generations](const std::string& name) { lab.mia_generation = generations.at(name); },
+          "Firmware of a Mia: acknowledging or streaming (default: what the configuration expects)")
+      ->check(CLI::IsMember({"acknowledging", "streaming"}));
+  command.add_flag("--wait", options.run.wait_for_play, "Play only when told to");
+  command.add_option("--faults", options.run.fault_script, "File of faults and when they happen");
+  CLI::Option* socket =
+      command.add_option("--socket", options.run.socket, "Socket for 'embodyctl sim' (default: a personal one)");
+  command.add_flag("--no-socket", options.run.no_socket, "Listen to standard input only")->excludes(socket);
+}
+
 int run_program(int argc, char** argv) {
-  CLI::App app{"The simulated lab of embody: QTM server, UR10e controller and Mia hand with real bytes on loopback."};
+  CLI::App app{"The simulated lab of embody: QTM server, UR controller and robot hand with real bytes on loopback."};
   app.set_version_flag("--version", std::string("embody-sim ") + kVersion);
   app.require_subcommand(1);
 
-  std::string config_file;
-  sim::LabConfig lab;
-  bool wait_for_play = false;
+  RunOptions run;
   CLI::App* run_command =
       app.add_subcommand("run", "Start the three devices and play a recording once, as soon as all of them are in use");
-  run_command->add_option("recording", lab.recording, "QTM export (TSV) to play")->required();
-  run_command->add_option("--config", config_file, "Configuration of the cell and the models (as for embodyd)");
-  run_command->add_option("--duration", lab.duration_s, "Play only so many seconds")->check(CLI::PositiveNumber);
-  run_command->add_option("--address", lab.address, "IPv4 address to listen on")->capture_default_str();
-  run_command->add_option("--qtm-port", lab.qtm_port, "TCP port of the QTM server; 0 takes a free one");
-  run_command->add_option("--ur-port", lab.ur_port, "TCP port of the UR controller; 0 takes a free one");
-  run_command->add_option("--ur-primary-port", lab.ur_primary_port, "TCP port in place of the controller's 30001");
-  run_command->add_option("--ur-dashboard-port", lab.ur_dashboard_port, "TCP port in place of the controller's 29999");
-  run_command->add_option("--mia-link", lab.mia_link, "Create a symlink to the hand's pseudo-terminal here");
-  run_command->add_flag("--wait", wait_for_play, "Play only after the line 'play' on standard input");
+  add_run_options(*run_command, run);
 
   std::string output;
   double duration_s = sim::kDemoDuration_s;
@@ -220,7 +169,7 @@ int run_program(int argc, char** argv) {
     return app.exit(error) == 0 ? kExitOk : kExitUsage;
   }
   if (*landmarks_command) return send_landmarks(landmarks);
-  return *generate_command ? generate(output, duration_s, seed) : run_lab(config_file, lab, wait_for_play);
+  return *generate_command ? generate(output, duration_s, seed) : run_lab(run);
 }
 
 }  // namespace

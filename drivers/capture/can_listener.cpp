@@ -2,6 +2,8 @@
 
 #include <poll.h>
 
+#include <algorithm>
+
 namespace embody::capture {
 namespace {
 
@@ -32,12 +34,12 @@ Result<transport::CanFrame> frame_of(std::span<const std::byte> bytes) {
   return frame;
 }
 
-void CanListener::start(transport::CanBus bus, transport::CanId host_sends) {
+void CanListener::start(transport::CanBus bus, std::vector<transport::CanId> host_sends) {
   bus_.emplace(std::move(bus));
-  thread_.start([this, host_sends] { run(host_sends); });
+  thread_.start([this, host_sends = std::move(host_sends)] { run(host_sends); });
 }
 
-void CanListener::run(transport::CanId host_sends) {
+void CanListener::run(const std::vector<transport::CanId>& host_sends) {
   const std::uint32_t connection = writer_.connection(0);
   while (!over_) {
     pollfd polled[2] = {{thread_.stop_fd(), POLLIN, 0}, {bus_->fd(), POLLIN, 0}};
@@ -48,7 +50,8 @@ void CanListener::run(transport::CanId host_sends) {
       const IoStatus status = bus_->receive(frame);
       if (status == IoStatus::kEmpty) break;
       if (status == IoStatus::kDone) {
-        writer_.bytes(connection, frame.id == host_sends ? Event::kOut : Event::kIn, bytes_of(frame));
+        const bool from_host = std::find(host_sends.begin(), host_sends.end(), frame.id) != host_sends.end();
+        writer_.bytes(connection, from_host ? Event::kOut : Event::kIn, bytes_of(frame));
       } else {
         writer_.closed(connection, End::kDevice, true);
         over_ = true;

@@ -2,7 +2,8 @@
 // Listens on a CAN bus beside a driver and records its frames. Sends nothing.
 #include <atomic>
 #include <optional>
-#include <string>
+#include <string_view>
+#include <vector>
 
 #include "drivers/capture/capture_writer.hpp"
 #include "drivers/capture/poll_thread.hpp"
@@ -24,15 +25,17 @@ class CanListener {
   CanListener& operator=(const CanListener&) = delete;
   ~CanListener() { stop(); }
 
-  /// Records the frames that `bus` receives; those with the identifier `host_sends` as outgoing.
-  void start(transport::CanBus bus, transport::CanId host_sends);
+  /// Records the frames that `bus` receives; those with an identifier of `host_sends` as outgoing.
+  void start(transport::CanBus bus, std::vector<transport::CanId> host_sends);
   void stop() { thread_.stop(); }
 
-  /// The bus is down or gone.
+  /// The bus is off, down or gone: reason() says which.
   [[nodiscard]] bool over() const noexcept { return over_; }
+  /// @pre over()
+  [[nodiscard]] std::string_view reason() const noexcept { return bus_->reason(); }
 
  private:
-  void run(transport::CanId host_sends);
+  void run(const std::vector<transport::CanId>& host_sends);
 
   CaptureWriter& writer_;
   std::optional<transport::CanBus> bus_;

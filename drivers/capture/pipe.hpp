@@ -38,7 +38,7 @@ class Pipe {
 
   Read read_;
   Write write_;
-  std::array<std::byte, 16 * 1024> buffer_{};
+  std::array<std::byte, std::size_t{16} * 1024> buffer_{};
   std::span<const std::byte> pending_;  // of the buffer
   bool ended_{false};
 };

@@ -27,8 +27,8 @@ ReplayDevice::~ReplayDevice() {
 Status ReplayDevice::start() {
   const LinkKind link = capture_.header.link;
   if (link == LinkKind::kUdp || link == LinkKind::kCan) {
-    return make_error(Errc::kUnsupported, "a capture of %s is not replayed: it has no connections",
-                      kLinkKindNames[static_cast<std::size_t>(link)]);
+    return make_error(Errc::kUnsupported, link == LinkKind::kCan ? "a capture of CAN is played by CanReplay"
+                                                                 : "a capture of UDP is not replayed");
   }
   if (capture_.chunks.empty()) return make_error(Errc::kInvalidArgument, "nothing to replay: the capture is empty");
   if (link == LinkKind::kSerial) {

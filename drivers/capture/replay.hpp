@@ -57,7 +57,7 @@ class ReplayDevice {
   ReplayDevice& operator=(const ReplayDevice&) = delete;
   ~ReplayDevice();
 
-  /// Errors: kUnsupported (links without connections: UDP, CAN), kInvalidArgument (nothing recorded), kIo.
+  /// Errors: kUnsupported (UDP; CAN: see can_replay.hpp), kInvalidArgument (nothing recorded), kIo.
   Status start();
 
   /// Where the driver has to connect for the device's `port`; 0: the first that was recorded.

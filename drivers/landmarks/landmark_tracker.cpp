@@ -6,15 +6,19 @@
 namespace embody::landmarks {
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;
 constexpr int kReceivesPerRead = 16;
 constexpr int kReceiveBuffer = 64 << 10;  // about 50 datagrams with the kernel's overhead
 
-void count(std::atomic<std::uint64_t>& counter) noexcept {
-  counter.fetch_add(1, kRelaxed);
-}
-
 }  // namespace
+
+LandmarkTracker::LandmarkTracker(LandmarkConfig config) : config_(std::move(config)) {
+  show({{"received", &counters_.received},
+        {"malformed", &counters_.malformed},
+        {"foreign", &counters_.foreign},
+        {"other_hand", &counters_.other_hand},
+        {"duplicates", &counters_.duplicates},
+        {"restarts", &counters_.restarts}});
+}
 
 Result<TrackerInfo> LandmarkTracker::connect() {
   fd_.reset();
@@ -47,11 +51,11 @@ IoStatus LandmarkTracker::read(MarkerFrame& frame) noexcept {
     const TimePoint t_arrival = transport::now();
     if (datagram.status == IoStatus::kDisconnected) reason_ = "the socket for landmarks broke";
     if (datagram.status != IoStatus::kDone) return datagram.status;
-    count(received_);
+    ++counters_.received;
     if (!network_.contains(datagram.source)) {
-      count(foreign_);
+      ++counters_.foreign;
     } else if (datagram.size != buffer.size()) {
-      count(malformed_);
+      ++counters_.malformed;
     } else if (take(buffer, t_arrival, frame)) {
       return IoStatus::kDone;
     }
@@ -62,9 +66,9 @@ IoStatus LandmarkTracker::read(MarkerFrame& frame) noexcept {
 /// Fills `frame` and returns true when the datagram is a new frame of our hand.
 bool LandmarkTracker::take(std::span<const std::byte> datagram, TimePoint t_arrival, MarkerFrame& frame) noexcept {
   const auto decoded = decode(datagram);
-  if (!decoded) return count(malformed_), false;
-  if (decoded->side != config_.side) return count(other_hand_), false;
-  if (!is_new(decoded->frame_number)) return count(duplicates_), false;
+  if (!decoded) return ++counters_.malformed, false;
+  if (decoded->side != config_.side) return ++counters_.other_hand, false;
+  if (!is_new(decoded->frame_number)) return ++counters_.duplicates, false;
   frame.frame_number = decoded->frame_number;
   frame.label_epoch = epoch_;
   frame.t_arrival = t_arrival;
@@ -83,14 +87,9 @@ bool LandmarkTracker::is_new(std::uint64_t frame_number) noexcept {
   const bool first = !started_;
   started_ = true;
   if (!first && frame_number == last_frame_) return false;
-  if (!first && frame_number < last_frame_) count(restarts_);
+  if (!first && frame_number < last_frame_) ++counters_.restarts;
   last_frame_ = frame_number;
   return true;
-}
-
-LandmarkCounters LandmarkTracker::counters() const noexcept {
-  return {received_.load(kRelaxed),   malformed_.load(kRelaxed),  foreign_.load(kRelaxed),
-          other_hand_.load(kRelaxed), duplicates_.load(kRelaxed), restarts_.load(kRelaxed)};
 }
 
 }  // namespace embody::landmarks

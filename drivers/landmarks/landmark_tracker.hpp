@@ -1,7 +1,6 @@
 #pragma once
 // A tracker of 21 hand landmarks that sends UDP datagrams (docs/landmarks.md) as a HandTracker.
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <string>
 
@@ -23,19 +22,19 @@ struct LandmarkConfig {
 
 /// What came and what of it was not used, since the driver exists.
 struct LandmarkCounters {
-  std::uint64_t received{0};    ///< datagrams, whatever they were
-  std::uint64_t malformed{0};   ///< broke the format; dropped
-  std::uint64_t foreign{0};     ///< from an address outside of the interface's network; dropped
-  std::uint64_t other_hand{0};  ///< of the other hand; dropped
-  std::uint64_t duplicates{0};  ///< same frame number as the one before; dropped
-  std::uint64_t restarts{0};    ///< the frame number went back: the sender started again; used
+  Counter received;    ///< datagrams, whatever they were
+  Counter malformed;   ///< broke the format; dropped
+  Counter foreign;     ///< from an address outside of the interface's network; dropped
+  Counter other_hand;  ///< of the other hand; dropped
+  Counter duplicates;  ///< same frame number as the one before; dropped
+  Counter restarts;    ///< the frame number went back: the sender started again; used
 };
 
 /// Binds a socket; whoever sends valid datagrams from the interface's network is the sensor. There is no handshake, so
 /// the session ends only when the socket breaks. Threads as HandTracker says; counters() from any.
 class LandmarkTracker final : public HandTracker {
  public:
-  explicit LandmarkTracker(LandmarkConfig config) : config_(std::move(config)) {}
+  explicit LandmarkTracker(LandmarkConfig config);
 
   /// Errors: kInvalidArgument, kNotFound (address), kIo (the port is taken).
   Result<TrackerInfo> connect() override;
@@ -46,7 +45,7 @@ class LandmarkTracker final : public HandTracker {
   /// At most 16 datagrams that are not used are dropped per call; then kEmpty, though more may wait.
   IoStatus read(MarkerFrame& frame) noexcept override;
 
-  [[nodiscard]] LandmarkCounters counters() const noexcept;
+  [[nodiscard]] const LandmarkCounters& counters() const noexcept { return counters_; }
   /// Port of the present session, 0 without one.
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
 
@@ -62,9 +61,7 @@ class LandmarkTracker final : public HandTracker {
   bool started_{false};  // a frame was used in this connection
   std::uint64_t last_frame_{0};
   std::uint32_t epoch_{0};
-
-  // Written by read(), read by anyone.
-  std::atomic<std::uint64_t> received_{0}, malformed_{0}, foreign_{0}, other_hand_{0}, duplicates_{0}, restarts_{0};
+  LandmarkCounters counters_;
 };
 
 }  // namespace embody::landmarks

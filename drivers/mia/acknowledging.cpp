@@ -89,7 +89,10 @@ void MiaHand::take_timeout(TimePoint now) noexcept {
   const bool reads = outgoing.purpose == Purpose::kPositions || outgoing.purpose == Purpose::kJointPositions;
   const bool moves = outgoing.purpose == Purpose::kMotion && !queue_.superseded(outgoing.motor, now);
   if (!reads && !moves) return;
-  if (!exchange_.retry(now)) return exchange_.resynchronise(now);
+  if (!exchange_.retry(now)) {
+    ++counters_.resyncs;
+    return exchange_.resynchronise(now);
+  }
   ++counters_.retries;
   ++counters_.commands;
   if (line_->send(outgoing.command) == IoStatus::kDisconnected) hang_up();

@@ -5,6 +5,7 @@
 
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
+#include "core/hal/counter.hpp"
 #include "drivers/mia/telemetry.hpp"
 #include "drivers/mia/transmission.hpp"
 
@@ -42,19 +43,20 @@ struct MiaConfig {
 /// Errors: kInvalidArgument, a sentence that names the value.
 [[nodiscard]] Status check(const MiaConfig& config) noexcept;
 
-/// What happened on the line since the object was made. To be read by the thread that calls read() and write().
+/// What happened on the line since the object was made.
 struct MiaCounters {
-  std::uint64_t commands{0};     ///< frames sent
-  std::uint64_t acks{0};         ///< good ACKs
-  std::uint64_t timeouts{0};     ///< ACK or data that did not come in time
-  std::uint64_t retries{0};      ///< commands sent a second time
-  std::uint64_t late_acks{0};    ///< ACKs that nobody waited for (any more)
-  std::uint64_t mismatches{0};   ///< other lines that were not what was waited for
-  std::uint64_t replies{0};      ///< position replies
-  std::uint64_t implausible{0};  ///< position replies thrown away because the hand cannot have moved there
-  std::uint64_t expired{0};      ///< queued motions dropped because their time had passed
-  std::uint64_t stops{0};        ///< stop exchanges started
-  std::uint64_t restarts{0};     ///< times that the hand was found to have restarted
+  Counter commands;     ///< frames sent
+  Counter acks;         ///< good ACKs
+  Counter timeouts;     ///< ACK or data that did not come in time
+  Counter retries;      ///< commands sent a second time
+  Counter resyncs;      ///< times that the line was left alone until late answers had come
+  Counter late_acks;    ///< ACKs that nobody waited for (any more)
+  Counter mismatches;   ///< other lines that were not what was waited for
+  Counter replies;      ///< position replies
+  Counter implausible;  ///< position replies thrown away because the hand cannot have moved there
+  Counter expired;      ///< queued motions dropped because their time had passed
+  Counter stops;        ///< stop exchanges started
+  Counter restarts;     ///< times that the hand was found to have restarted (its supply may have dropped)
 };
 
 }  // namespace embody::mia

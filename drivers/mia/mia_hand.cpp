@@ -13,6 +13,7 @@ namespace {
 constexpr Duration kRefresh = std::chrono::milliseconds(900);           ///< acknowledged targets are repeated so often
 constexpr Duration kStreamingRefresh = std::chrono::milliseconds(250);  ///< where nobody tells what arrived
 constexpr Duration kBlind = std::chrono::milliseconds(300);  ///< streaming: positions this old are no basis for motion
+constexpr Duration kReadingsOverdue = std::chrono::seconds(3);  ///< several turns of both channels
 constexpr Duration kStopPoll = std::chrono::milliseconds(50);
 constexpr Duration kStopPatience = std::chrono::milliseconds(500);
 constexpr int kLinesPerCall = 64;  ///< far more than the line carries in 20 ms
@@ -26,10 +27,20 @@ constexpr std::size_t at(Motor motor) noexcept {
 MiaHand::MiaHand(MiaConfig config) : MiaHand(config, serial_line(config.device)) {}
 
 MiaHand::MiaHand(MiaConfig config, OpenLine open)
-    : config_(std::move(config)),
-      open_(std::move(open)),
-      watch_(config_.speed_percent),
-      telemetry_(config_.telemetry) {}
+    : config_(std::move(config)), open_(std::move(open)), watch_(config_.speed_percent), telemetry_(config_.telemetry) {
+  show({{"commands", &counters_.commands},
+        {"acks", &counters_.acks},
+        {"timeouts", &counters_.timeouts},
+        {"retries", &counters_.retries},
+        {"resyncs", &counters_.resyncs},
+        {"late_acks", &counters_.late_acks},
+        {"mismatches", &counters_.mismatches},
+        {"replies", &counters_.replies},
+        {"implausible", &counters_.implausible},
+        {"expired", &counters_.expired},
+        {"stops", &counters_.stops},
+        {"restarts", &counters_.restarts}});
+}
 
 MiaHand::~MiaHand() {
   end_session();
@@ -48,7 +59,23 @@ IoStatus MiaHand::read(HandDeviceState& state) noexcept {
   state.t_arrival = reply_.t_arrival;
   state.joint_count = kMotors;
   std::copy(reply_.q_rad.begin(), reply_.q_rad.end(), state.q_rad.begin());
+  tell(reply_.t_arrival, state.telemetry);
   return IoStatus::kDone;
+}
+
+void MiaHand::tell(TimePoint now, HandTelemetry& telemetry) const noexcept {
+  telemetry = {};
+  telemetry_.tell(now, telemetry);
+  if (calibration_in_doubt()) {
+    telemetry.condition = HandCondition::kRestarted;
+    telemetry.why_not = "the hand restarted: check its supply, calibrate it, then start the daemon again";
+  } else if (stop_.latched() && !stop_.may_open()) {
+    telemetry.condition = HandCondition::kStopped;
+    telemetry.why_not = "the hand was stopped: hold first";
+  } else {
+    const bool silent = now - t_session_ > kReadingsOverdue && telemetry_.silent(now - kReadingsOverdue);
+    telemetry.condition = silent ? HandCondition::kNoReadings : HandCondition::kReady;
+  }
 }
 
 IoStatus MiaHand::write(const HandCommand& command, TimePoint now) noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 // A Prensilia Mia hand on a serial line, or on another wire that carries its protocol.
 #include <atomic>
+#include <functional>
 
 #include "core/hal/hand_driver.hpp"
 #include "drivers/mia/exchange.hpp"
@@ -44,17 +45,18 @@ class MiaHand final : public HandDriver {
 
   /// Makes a connected hand calibrate its motor positions: **it moves**. Blocks until the positions have been still for
   /// a second, at most 30 s; the hand itself shows the end by its green light only. Call it in place of read() and
-  /// write(), never while they run. Leaves the confirmation to the operator. Acknowledging firmware only.
-  /// Errors: kDisconnected, kRefused (stopped), kUnsupported, kTimeout.
-  Status calibrate();
+  /// write(), never while they run. Leaves the confirmation to the operator. Acknowledging firmware only. `cancelled`
+  /// is asked ten times a second; then the hand is stopped (whether a stop ends a calibration was not tried on
+  /// hardware). Errors: kDisconnected, kRefused (stopped, cancelled), kUnsupported, kTimeout.
+  Status calibrate(const std::function<bool()>& cancelled = {});
   /// The operator has seen that the counters are right. From any thread.
   void confirm_calibration() noexcept { calibration_in_doubt_.store(false, std::memory_order_relaxed); }
   [[nodiscard]] bool calibration_in_doubt() const noexcept {
     return calibration_in_doubt_.load(std::memory_order_relaxed);
   }
 
-  // The rest is for the thread that calls read() and write().
   [[nodiscard]] const MiaCounters& counters() const noexcept { return counters_; }
+  // The rest is for the thread that calls read() and write().
   [[nodiscard]] const MiaTelemetry& telemetry() const noexcept { return telemetry_.data(); }
   /// Takes the mean of the next readings for zero force.
   void tare() noexcept { telemetry_.tare(); }
@@ -90,6 +92,7 @@ class MiaHand final : public HandDriver {
   void hang_up() noexcept;
   void hand_restarted() noexcept;
   void doubt_calibration() noexcept;
+  void tell(TimePoint now, HandTelemetry& telemetry) const noexcept;
 
   // Both generations
   void pump() noexcept;
@@ -142,6 +145,7 @@ class MiaHand final : public HandDriver {
   std::size_t next_slot_{0};  ///< motors, then the position request: each in turn, so that none starves
   int timeouts_in_a_row_{0};
   int missed_replies_{0};
+  TimePoint t_session_{};  ///< began
   TimePoint t_written_{};
   TimePoint t_asked_{};      ///< last position request
   TimePoint t_stop_over_{};  ///< the last stop sequence had been sent

@@ -19,7 +19,7 @@ void MotionQueue::forget() noexcept {
   told_ = {};
 }
 
-std::optional<int> MotionQueue::take(std::size_t motor, TimePoint now, std::uint64_t& expired) noexcept {
+std::optional<int> MotionQueue::take(std::size_t motor, TimePoint now, Counter& expired) noexcept {
   Waiting& waiting = waiting_[motor];
   if (!std::exchange(waiting.pending, false)) return std::nullopt;
   if (now > waiting.t_expires) {

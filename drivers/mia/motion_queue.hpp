@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/base/time.hpp"
+#include "core/hal/counter.hpp"
 #include "drivers/mia/transmission.hpp"
 
 namespace embody::mia {
@@ -19,7 +20,7 @@ class MotionQueue {
   void forget() noexcept;
 
   /// Takes what waits for `motor`. What has expired is dropped and counted in `expired`.
-  std::optional<int> take(std::size_t motor, TimePoint now, std::uint64_t& expired) noexcept;
+  std::optional<int> take(std::size_t motor, TimePoint now, Counter& expired) noexcept;
   /// `motor` has heard `value`, sent at `t_sent`.
   void heard(std::size_t motor, int value, TimePoint t_sent) noexcept { told_[motor] = {true, value, t_sent}; }
 

@@ -36,7 +36,10 @@ bool MotionWatch::begin(const std::array<double, kMotors>& counts, TimePoint now
 }
 
 void MotionWatch::told(std::size_t motor, double counts) noexcept {
-  courses_[motor] = {Course::kToTarget, counts};
+  MotorCourse& course = courses_[motor];
+  const bool under_way = course.course == Course::kToTarget || course.course == Course::kStopping;
+  course = {Course::kToTarget, counts, under_way ? std::min(course.least, counts) : counts,
+            under_way ? std::max(course.most, counts) : counts};
 }
 
 void MotionWatch::told_to_stop() noexcept {
@@ -63,6 +66,7 @@ void MotionWatch::accept(const std::array<double, kMotors>& counts, TimePoint no
   last_ = counts;
   t_last_ = now;
   for (MotorCourse& course : courses_) {
+    course.least = course.most = course.target;
     if (course.course == Course::kStopping) course.course = Course::kStopped;
   }
   if (!near(counts, reference_, kSteady_counts)) {
@@ -76,12 +80,13 @@ void MotionWatch::accept(const std::array<double, kMotors>& counts, TimePoint no
   }
 }
 
-/// Outside of the way from the last reading to the target by more than `slack`.
+/// Outside of the way from the last reading to the targets since then by more than `slack`.
 bool MotionWatch::off_course(std::size_t motor, double counts, double slack) const noexcept {
-  const auto& [course, target] = courses_[motor];
-  if (course == Course::kUnknown) return false;
-  const double end = course == Course::kStopped ? last_[motor] : target;
-  return counts < std::min(last_[motor], end) - slack || counts > std::max(last_[motor], end) + slack;
+  const MotorCourse& course = courses_[motor];
+  const double here = last_[motor];
+  if (course.course == Course::kUnknown) return false;
+  if (course.course == Course::kStopped) return std::abs(counts - here) > slack;
+  return counts < std::min(here, course.least) - slack || counts > std::max(here, course.most) + slack;
 }
 
 bool MotionWatch::plausible(const std::array<double, kMotors>& counts, Duration elapsed) const noexcept {

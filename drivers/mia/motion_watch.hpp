@@ -39,6 +39,7 @@ class MotionWatch {
   struct MotorCourse {
     Course course{Course::kUnknown};
     double target{0.0};
+    double least{0.0}, most{0.0};  ///< of the targets since the last reading and the one in force then
   };
 
   [[nodiscard]] bool off_course(std::size_t motor, double counts, double slack) const noexcept;

@@ -46,6 +46,7 @@ Result<HandInfo> MiaHand::start_session() {
   stream_ = {.t_line = now, .t_position = now};
   read_pending_ = false;
   timeouts_in_a_row_ = missed_replies_ = 0;
+  t_session_ = now;
   lost_ = hung_up_ = false;
   reason_ = {};
   return describe(probed->firmware.view());
@@ -122,7 +123,7 @@ void MiaHand::end_session() noexcept {
   line_.reset();
 }
 
-Status MiaHand::calibrate() {
+Status MiaHand::calibrate(const std::function<bool()>& cancelled) {
   const char* device = config_.device.c_str();
   if (lost_ || !line_) return make_error(Errc::kDisconnected, "the hand at %s is not connected", device);
   if (generation_ == Generation::kStreaming) {
@@ -143,6 +144,11 @@ Status MiaHand::calibrate() {
   std::array<double, kMotors> last{};
   TimePoint t_moved = transport::now();
   for (const TimePoint t_end = t_moved + kCalibrationTime; transport::now() < t_end;) {
+    if (cancelled && cancelled()) {
+      end_session();
+      return make_error(Errc::kRefused, "interrupted: the hand at %s was told to stop (AS)%s; calibrate it again",
+                        device, stop_.heard() ? "" : ", but did not answer: watch it");
+    }
     const TimePoint next = transport::now() + kCalibrationPoll;
     const auto counts = ask_counts(*line_, config_, next);
     const TimePoint now = transport::now();

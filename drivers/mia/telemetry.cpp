@@ -1,5 +1,6 @@
 #include "drivers/mia/telemetry.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace embody::mia {
@@ -93,12 +94,43 @@ void TelemetryReader::take_strain(const std::array<int, kStrainFields>& strain) 
       ++data_.tares;
     }
   }
-  auto& [thumb, index, mrl] = data_.force;
+  std::array<int, kStrainFields> less = strain;
+  for (std::size_t i = 0; i < kStrainFields; ++i) less[i] -= data_.offset[i];
+  data_.force = forces_of(less, config_.strain_fields);
+}
+
+bool TelemetryReader::silent(TimePoint since) const noexcept {
+  if (config_.every_cycles == 0) return false;
+  return (config_.currents && data_.t_currents < since) || (config_.forces && data_.t_forces < since);
+}
+
+void TelemetryReader::tell(TimePoint now, HandTelemetry& telemetry) const noexcept {
+  telemetry.t_current = telemetry.t_force = {};
+  if (data_.current_samples > 0 && now - data_.t_currents <= kFresh) {
+    telemetry.t_current = data_.t_currents;
+    telemetry.current_count = kMotors;
+    telemetry.current_in_ampere = false;
+    std::copy(data_.current.begin(), data_.current.end(), telemetry.current_raw.begin());
+  }
+  if (data_.force_samples > 0 && now - data_.t_forces <= kFresh) tell_forces(data_.force, data_.t_forces, telemetry);
+}
+
+Forces forces_of(const std::array<int, kStrainFields>& strain,
+                 const std::array<StrainField, kStrainFields>& fields) noexcept {
+  Forces forces{};
+  auto& [thumb, index, mrl] = forces;
   const std::array<int*, kSensors> place{nullptr,           &thumb.normal, &thumb.tangential, &index.normal,
                                          &index.tangential, &mrl.normal,   &mrl.tangential};
   for (std::size_t i = 0; i < kStrainFields; ++i) {
-    if (int* to = place[static_cast<std::size_t>(config_.strain_fields[i])]) *to = strain[i] - data_.offset[i];
+    if (int* to = place[static_cast<std::size_t>(fields[i])]) *to = strain[i];
   }
+  return forces;
+}
+
+void tell_forces(const Forces& forces, TimePoint t, HandTelemetry& telemetry) noexcept {
+  telemetry.t_force = t;
+  // The order of Motor is that of the fingers.
+  for (std::size_t i = 0; i < kMotors; ++i) telemetry.force[i] = {true, forces[i].normal, forces[i].tangential};
 }
 
 }  // namespace embody::mia

@@ -6,6 +6,7 @@
 
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
+#include "core/hal/hand_telemetry.hpp"
 #include "drivers/mia/codec.hpp"
 
 namespace embody::mia {
@@ -22,7 +23,9 @@ enum class StrainField : std::uint8_t {
 };
 
 struct TelemetryConfig {
-  unsigned every_cycles{0};  ///< ask for one reading in so many write()s; 0: never. Streaming: 0 or not 0
+  /// Ask for one reading, currents and forces in turn, in so many write()s; 0: never. At 20 Hz, four make 5 readings a
+  /// second: 4 % of the acknowledging firmware's line. Streaming firmware: 0 or not 0, the hand has its own pace.
+  unsigned every_cycles{4};
   bool currents{true};
   bool forces{true};
   /// Order of the wire. The default is that of the vendor's ROS 2 driver; the ROS 1 driver names normal and tangential
@@ -49,10 +52,17 @@ struct MiaTelemetry {
   TimePoint t_forces{};                      ///< arrival
   std::array<int, kMotors> current{};        ///< 0..1024, order of Motor
   std::array<int, kStrainFields> strain{};   ///< raw, order of the wire
-  std::array<FingerForce, kMotors> force{};  ///< less the offsets, order of Motor (MRL: the middle finger)
+  std::array<FingerForce, kMotors> force{};  ///< less the offsets, order of Motor (MRL: the middle finger has them)
   std::array<int, kStrainFields> offset{};   ///< what is taken off
   std::uint64_t tares{0};                    ///< completed ones
 };
+
+using Forces = std::array<FingerForce, kMotors>;
+/// Readings by finger, in the order of Motor.
+[[nodiscard]] Forces forces_of(const std::array<int, kStrainFields>& strain,
+                               const std::array<StrainField, kStrainFields>& fields) noexcept;
+/// Enters forces that arrived at `t`: thumb, index and middle finger.
+void tell_forces(const Forces& forces, TimePoint t, HandTelemetry& telemetry) noexcept;
 
 /// Keeps the newest readings and chooses what to ask for next. No I/O, no heap.
 class TelemetryReader {
@@ -76,6 +86,11 @@ class TelemetryReader {
   static constexpr int kTareSamples = 8;
 
   [[nodiscard]] const MiaTelemetry& data() const noexcept { return data_; }
+  /// Enters readings that are not older than kFresh at `now`.
+  void tell(TimePoint now, HandTelemetry& telemetry) const noexcept;
+  /// A channel that should speak has not done so since `since`.
+  [[nodiscard]] bool silent(TimePoint since) const noexcept;
+  static constexpr Duration kFresh = std::chrono::seconds(2);
 
  private:
   void take_strain(const std::array<int, kStrainFields>& strain) noexcept;

@@ -3,6 +3,8 @@
 #include <sys/epoll.h>
 #include <sys/socket.h>
 
+#include <cerrno>
+
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
 
@@ -72,7 +74,7 @@ Result<std::span<const std::byte>> PacketSource::next_of_stream() noexcept {
     const auto received = transport::receive(stream_.fd(), input.free_space());
     if (received.status == IoStatus::kEmpty) return kNothing;
     if (received.status == IoStatus::kDisconnected) {
-      return make_error(Errc::kDisconnected, "QTM closed the connection");
+      return make_error(Errc::kDisconnected, "QTM %s", transport::ending(errno));
     }
     --receives_left_;
     t_received_ = transport::now();

@@ -42,9 +42,20 @@ std::optional<UdpOptions> udp_options(const QualisysConfig& config) {
 }  // namespace
 
 QualisysTracker::QualisysTracker(QualisysConfig config, std::vector<std::string> marker_names)
-    : config_(std::move(config)),
-      wanted_{std::move(marker_names), config_.optional_markers, config_.rigid_body},
-      tally_(std::make_unique<Tally>()) {}
+    : config_(std::move(config)), wanted_{std::move(marker_names), config_.optional_markers, config_.rigid_body} {
+  show({{"frames", &counters_.frames},
+        {"skipped", &counters_.skipped},
+        {"drains", &counters_.drains},
+        {"missing", &counters_.missing},
+        {"useless", &counters_.useless},
+        {"incomplete", &counters_.incomplete},
+        {"foreign", &counters_.foreign},
+        {"malformed", &counters_.malformed},
+        {"other_packets", &counters_.other_packets},
+        {"clock_restarts", &counters_.clock_restarts},
+        {"doubtful_events", &counters_.doubtful_events},
+        {"label_epochs", &counters_.label_epochs}});
+}
 
 QualisysTracker::~QualisysTracker() = default;
 
@@ -74,8 +85,8 @@ Result<TrackerInfo> QualisysTracker::connect() {
   std::string peer = "QTM at " + config_.host + ":" + std::to_string(config_.port);
   if (const auto warning = processing_warning(*parameters, wanted_); !warning.empty()) peer += "; " + warning;
   session_ = std::make_unique<Session>(std::move(*source), std::move(*control), std::move(*parameters), wanted_);
-  tally_->begin_session();
-  ++label_epoch_;
+  before_ = counters_;
+  begin_label_epoch();
   const bool playback = *state == Event::kPlaybackStarted;
   return TrackerInfo{session_->source.fd(), session_->parameters.frequency_hz, playback, std::string_view(peer)};
 }
@@ -116,10 +127,6 @@ Status QualisysTracker::check_flow(Event state) const {
   if (!is_measuring(state) || silence <= kSilence) return {};
   return make_error(Errc::kTimeout, "QTM %s but has sent no frame for %.0f s; is its real-time processing on?",
                     describe(state), to_seconds(silence));
-}
-
-QualisysCounters QualisysTracker::counters() const noexcept {
-  return tally_->get();
 }
 
 }  // namespace embody::qualisys

@@ -33,14 +33,18 @@ struct QualisysConfig {
 
 /// What came and what of it was not used, since the driver exists.
 struct QualisysCounters {
-  std::uint64_t frames{0};           ///< handed to the loop
-  std::uint64_t skipped{0};          ///< frames left out to catch up with the newest
-  std::uint64_t useless{0};          ///< packets out of order or twice
-  std::uint64_t incomplete{0};       ///< frames of which a component never came
-  std::uint64_t foreign{0};          ///< datagrams of other hosts
-  std::uint64_t malformed{0};        ///< datagrams that break the format
-  std::uint64_t clock_restarts{0};   ///< QTM's time went back or leapt
-  std::uint64_t doubtful_events{0};  ///< events that began a new label epoch
+  Counter frames;           ///< handed to the loop
+  Counter skipped;          ///< frames left out to catch up with the newest
+  Counter drains;           ///< times that frames were left out
+  Counter missing;          ///< frame numbers that were passed over: lost datagrams, or QTM left frames out
+  Counter useless;          ///< packets out of order or twice
+  Counter incomplete;       ///< frames of which a component never came
+  Counter foreign;          ///< datagrams of other hosts
+  Counter malformed;        ///< datagrams that break the format
+  Counter other_packets;    ///< packets that are neither frames nor events
+  Counter clock_restarts;   ///< QTM's time went back or leapt
+  Counter doubtful_events;  ///< events that began a new label epoch
+  Counter label_epochs;     ///< begun: one per session, doubtful event and clock restart
 };
 
 /// One session with QTM. Threads as HandTracker says: connect() and service() on one thread, read() on another.
@@ -71,11 +75,10 @@ class QualisysTracker final : public HandTracker {
   IoStatus read(MarkerFrame& frame) noexcept override;
 
   /// From any thread.
-  [[nodiscard]] QualisysCounters counters() const noexcept;
+  [[nodiscard]] const QualisysCounters& counters() const noexcept { return counters_; }
 
  private:
   struct Session;
-  struct Tally;
   enum class Taken { kNothing, kFrame, kEnd };
 
   Status upkeep();
@@ -84,13 +87,17 @@ class QualisysTracker final : public HandTracker {
   Taken take_event(std::span<const std::byte> packet) noexcept;
   Taken take_data(std::span<const std::byte> packet, MarkerFrame& frame) noexcept;
   Taken fill(const DataPacket& data, MarkerFrame& frame) noexcept;
+  void begin_label_epoch() noexcept;
+  void count_missing(std::uint64_t frame_number) noexcept;
+  void count_session() noexcept;
   Taken end_session(const Error& error) noexcept;
   [[nodiscard]] bool is_backlog(Duration age) noexcept;
   IoStatus deliver(const MarkerFrame& frame, std::uint64_t waiting) noexcept;
 
   QualisysConfig config_;
   Wanted wanted_;
-  std::unique_ptr<Tally> tally_;
+  QualisysCounters counters_;
+  QualisysCounters before_;  ///< when this session began
   std::unique_ptr<Session> session_;
   std::uint32_t label_epoch_{0};
 };

@@ -1,5 +1,6 @@
 // The real-time half of the tracker: packets to frames, on the tracker loop.
 #include <algorithm>
+#include <utility>
 
 #include "drivers/qualisys/event_rules.hpp"
 #include "drivers/qualisys/tracker_session.hpp"
@@ -39,7 +40,7 @@ IoStatus QualisysTracker::read(MarkerFrame& frame) noexcept {
     if (!is_backlog(std::max(t_read, frame.t_arrival) - frame.t_capture)) break;
     if (!was_catching_up) session.source.restock(kReceivesCatchingUp);
   }
-  tally_->take(session);
+  count_session();
   if (taken == Taken::kEnd) return IoStatus::kDisconnected;
   if (waiting == 0) return IoStatus::kEmpty;
   return deliver(frame, waiting);
@@ -55,8 +56,9 @@ bool QualisysTracker::is_backlog(Duration age) noexcept {
 IoStatus QualisysTracker::deliver(const MarkerFrame& frame, std::uint64_t waiting) noexcept {
   auto& session = *session_;
   session.catching_up = false;
-  Tally::count(tally_->frames);
-  Tally::count(tally_->skipped, waiting - 1);
+  ++counters_.frames;
+  counters_.skipped += waiting - 1;
+  if (waiting > 1) ++counters_.drains;
   if (frame.t_arrival - frame.t_capture <= kTooLate) {
     session.t_late = {};
   } else if (session.t_late == TimePoint{}) {
@@ -86,6 +88,7 @@ QualisysTracker::Taken QualisysTracker::take_packet(std::span<const std::byte> p
                                     static_cast<int>(std::min<std::size_t>(text->size(), 80)), text->data()));
     }
     default:
+      ++counters_.other_packets;
       return Taken::kNothing;
   }
 }
@@ -96,8 +99,8 @@ QualisysTracker::Taken QualisysTracker::take_event(std::span<const std::byte> pa
   const auto effect = effect_of(*event, config_.allow_playback);
   if (effect == EventEffect::kEnd) return end_session(make_error(Errc::kRefused, "QTM %s", describe(*event)));
   if (effect == EventEffect::kDoubt) {
-    ++label_epoch_;
-    Tally::count(tally_->events);
+    ++counters_.doubtful_events;
+    begin_label_epoch();
   }
   return Taken::kNothing;
 }
@@ -115,7 +118,10 @@ QualisysTracker::Taken QualisysTracker::take_data(std::span<const std::byte> pac
   session.flow.idle.store(false, std::memory_order_relaxed);
   const auto restarts = session.assembler.restarts();
   const auto assembly = session.assembler.step(session.data, t_arrival);
-  if (session.assembler.restarts() != restarts) ++label_epoch_;
+  if (session.assembler.restarts() != restarts) {
+    begin_label_epoch();
+    session.last_number = 0;
+  }
   if (assembly == Assembly::kWhole) {
     session.flow.t_frame_ns.store(t_arrival.time_since_epoch().count(), std::memory_order_relaxed);
     return fill(session.assembler.frame(), frame);
@@ -141,6 +147,7 @@ QualisysTracker::Taken QualisysTracker::fill(const DataPacket& data, MarkerFrame
     }
     frame.body = data.bodies[all ? map.body : map.body_among_enabled];
   }
+  count_missing(data.frame_number);
   frame.frame_number = data.frame_number;
   frame.label_epoch = label_epoch_;
   frame.t_arrival = session.source.t_received();
@@ -152,6 +159,30 @@ QualisysTracker::Taken QualisysTracker::fill(const DataPacket& data, MarkerFrame
     frame.markers[slot] = label == DataMap::kNone ? Marker{} : data.markers[label];
   }
   return Taken::kFrame;
+}
+
+void QualisysTracker::begin_label_epoch() noexcept {
+  ++label_epoch_;
+  ++counters_.label_epochs;
+}
+
+/// QTM's frame number may stand still, go back or leap (a new measurement): only a short gap is frames that are
+/// missing.
+void QualisysTracker::count_missing(std::uint64_t frame_number) noexcept {
+  constexpr std::uint64_t kLongestGap = 10'000;
+  const std::uint64_t last = std::exchange(session_->last_number, frame_number);
+  if (last == 0 || frame_number <= last || frame_number - last > kLongestGap) return;
+  counters_.missing += frame_number - last - 1;
+}
+
+/// Adds what the parts of this session count by themselves.
+void QualisysTracker::count_session() noexcept {
+  const Session& session = *session_;
+  counters_.useless = before_.useless + session.assembler.useless();
+  counters_.incomplete = before_.incomplete + session.assembler.incomplete();
+  counters_.foreign = before_.foreign + session.source.foreign();
+  counters_.malformed = before_.malformed + session.source.malformed();
+  counters_.clock_restarts = before_.clock_restarts + session.assembler.restarts();
 }
 
 QualisysTracker::Taken QualisysTracker::end_session(const Error& error) noexcept {

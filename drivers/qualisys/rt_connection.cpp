@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cerrno>
 
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
@@ -112,7 +113,7 @@ Result<std::span<const std::byte>> RtConnection::wait_packet(TimePoint deadline)
     if (!packet || !packet->empty()) return packet;
     const auto received = transport::receive(fd_.get(), input_.free_space());
     if (received.status == IoStatus::kDisconnected) {
-      return make_error(Errc::kDisconnected, "QTM closed the connection");
+      return make_error(Errc::kDisconnected, "QTM %s", transport::ending(errno));
     }
     input_.commit(received.size);
     if (received.status == IoStatus::kDone && transport::now() < deadline) continue;

@@ -21,7 +21,7 @@ class RtConnection {
  public:
   /// Connects, waits for the welcome and sets the protocol version: the first one that QTM accepts from
   /// 1.`newest_minor` down to 1.8. Packets of up to `buffer_size` bytes pass. A peer that vanishes without a word is
-  /// noticed by the kernel within about 3 s.
+  /// noticed by the kernel within about 3 s (test_broken_link).
   /// Errors: kNotFound, kDisconnected, kTimeout, kRefused, kUnsupported (version), kMalformed; see their sentences.
   [[nodiscard]] static Result<RtConnection> open(const std::string& host, std::uint16_t port, std::size_t buffer_size,
                                                  TimePoint deadline, ByteOrder order = ByteOrder::kLittle,

@@ -17,6 +17,7 @@ Status check_body(const std::vector<BodyParameters>& bodies, const std::string& 
       std::find_if(bodies.begin(), bodies.end(), [&](const BodyParameters& each) { return each.name == name; });
   if (body == bodies.end()) {
     std::vector<std::string> names;
+    names.reserve(bodies.size());
     for (const auto& each : bodies) names.push_back(each.name);
     return make_error(Errc::kNotFound, "QTM has no rigid body %s; define it in QTM or choose another one",
                       describe_missing({name}, names, 150).c_str());

@@ -41,32 +41,8 @@ struct QualisysTracker::Session {
   DataPacket data;
   teleop::ClockMap clock;
   bool catching_up{false};
-  TimePoint t_late{};  // frames are late by more than a second since
-};
-
-/// Written by read() and connect(), read by anyone.
-struct QualisysTracker::Tally {
-  using Counter = std::atomic<std::uint64_t>;
-  Counter frames{0}, skipped{0}, useless{0}, incomplete{0}, foreign{0}, malformed{0}, clock_restarts{0}, events{0};
-  QualisysCounters before;  // of earlier sessions
-
-  static void count(Counter& counter, std::uint64_t by = 1) noexcept {
-    counter.fetch_add(by, std::memory_order_relaxed);
-  }
-  [[nodiscard]] QualisysCounters get() const noexcept {
-    return {frames.load(),  skipped.load(),   useless.load(),        incomplete.load(),
-            foreign.load(), malformed.load(), clock_restarts.load(), events.load()};
-  }
-  void begin_session() noexcept { before = get(); }
-  /// Adds what the session counts by itself.
-  void take(const Session& session) noexcept {
-    const auto store = [](Counter& counter, std::uint64_t value) { counter.store(value, std::memory_order_relaxed); };
-    store(useless, before.useless + session.assembler.useless());
-    store(incomplete, before.incomplete + session.assembler.incomplete());
-    store(foreign, before.foreign + session.source.foreign());
-    store(malformed, before.malformed + session.source.malformed());
-    store(clock_restarts, before.clock_restarts + session.assembler.restarts());
-  }
+  std::uint64_t last_number{0};  // of the last frame; 0: none yet
+  TimePoint t_late{};            // frames are late by more than a second since
 };
 
 }  // namespace embody::qualisys

@@ -20,7 +20,19 @@ constexpr int kReadsPerCall = 16;                                 ///< far more 
 
 }  // namespace
 
-RobotiqHand::RobotiqHand(RobotiqConfig config) : config_(std::move(config)) {}
+RobotiqHand::RobotiqHand(RobotiqConfig config) : config_(std::move(config)) {
+  show({{"requests", &counters_.requests},
+        {"replies", &counters_.replies},
+        {"statuses", &counters_.statuses},
+        {"timeouts", &counters_.timeouts},
+        {"crc_errors", &counters_.crc_errors},
+        {"exceptions", &counters_.exceptions},
+        {"faults", &counters_.faults},
+        {"expired", &counters_.expired},
+        {"withheld", &counters_.withheld},
+        {"stops", &counters_.stops},
+        {"activations", &counters_.activations}});
+}
 
 RobotiqHand::~RobotiqHand() {
   end_session();
@@ -40,7 +52,30 @@ IoStatus RobotiqHand::read(HandDeviceState& state) noexcept {
   state.t_arrival = status_.when;
   state.joint_count = 1;
   state.q_rad[0] = angle_of(config_.scale, status_.last.position);
+  tell(state.telemetry);
   return IoStatus::kDone;
+}
+
+void RobotiqHand::tell(HandTelemetry& telemetry) const noexcept {
+  constexpr std::uint8_t kUnderVoltage = 0xA;
+  const GripperStatus& status = status_.last;
+  telemetry = {};
+  telemetry.supply = status.fault == kUnderVoltage ? HandSupply::kLow : HandSupply::kGood;
+  telemetry.t_current = status_.when;
+  telemetry.current_count = 1;
+  telemetry.current_in_ampere = true;
+  telemetry.current_a[0] = status.current_a();
+  telemetry.why_not = why_not();
+  const bool held = status.object == ObjectState::kStoppedClosing || status.object == ObjectState::kStoppedOpening;
+  if (stop_.latched && !(stop_.hold_seen && !stop_.under_way)) {
+    telemetry.condition = HandCondition::kStopped;
+  } else if (!allows_motion(status.fault) && status.fault > 0x7) {
+    telemetry.condition = HandCondition::kFault;
+  } else if (!telemetry.why_not.empty()) {
+    telemetry.condition = HandCondition::kNotActivated;
+  } else {
+    telemetry.condition = status.go && held ? HandCondition::kHoldsObject : HandCondition::kReady;
+  }
 }
 
 IoStatus RobotiqHand::write(const HandCommand& command, TimePoint now) noexcept {
@@ -120,7 +155,9 @@ void RobotiqHand::drain() noexcept {
       return lose("the serial device is gone; is it unplugged?");
     }
     if (status != IoStatus::kDone) break;
-    if (bus_.waiting) incoming_.push({buffer.data(), size});
+    if (!bus_.waiting) continue;
+    bus_.heard = true;
+    incoming_.push({buffer.data(), size});
   }
 }
 
@@ -155,7 +192,9 @@ void RobotiqHand::take_reply(const modbus::Reply& reply, TimePoint now) noexcept
 
 void RobotiqHand::take_status(const modbus::Reply& reply, TimePoint now) noexcept {
   ++counters_.statuses;
+  const std::uint8_t fault_before = status_.last.fault;
   status_.last = unpack_status({reply.values[0], reply.values[1], reply.values[2]});
+  if (status_.last.fault != 0 && status_.last.fault != fault_before) ++counters_.faults;
   status_.when = now;
   status_.fresh = status_.believed = true;
   ++status_.number;
@@ -168,6 +207,7 @@ void RobotiqHand::take_status(const modbus::Reply& reply, TimePoint now) noexcep
 
 void RobotiqHand::take_failure(std::uint8_t exception) noexcept {
   if (exception == 0) ++counters_.timeouts;
+  if (exception == 0 && bus_.heard) ++counters_.crc_errors;
   ++bus_.failures_in_a_row;
   bus_.exception = exception;
   bus_.waiting = false;
@@ -221,6 +261,7 @@ void RobotiqHand::transmit(const modbus::Request& request, Sent what, TimePoint 
   bus_.request = request;
   bus_.sent = what;
   bus_.waiting = true;
+  bus_.heard = false;
   bus_.t_sent = now;
   bus_.deadline = now + config_.reply_timeout;
   ++counters_.requests;

@@ -1,6 +1,7 @@
 #pragma once
 // A Robotiq 2F-140 (or 2F-85) gripper on a serial line, Modbus RTU, 115200 baud 8N1.
 #include <atomic>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -25,17 +26,19 @@ struct RobotiqConfig {
   PositionScale scale;
 };
 
-/// What happened since the object was made. To be read by the thread that calls read() and write().
+/// What happened since the object was made.
 struct RobotiqCounters {
-  std::uint64_t requests{0};     ///< frames sent
-  std::uint64_t replies{0};      ///< good answers
-  std::uint64_t statuses{0};     ///< of these: with a status
-  std::uint64_t timeouts{0};     ///< answers that did not come in time, or were not intact
-  std::uint64_t exceptions{0};   ///< requests that the gripper refused
-  std::uint64_t expired{0};      ///< queued motions dropped because their time had passed
-  std::uint64_t withheld{0};     ///< queued motions dropped because the gripper was not known to be activated
-  std::uint64_t stops{0};        ///< stop exchanges started
-  std::uint64_t activations{0};  ///< activations started
+  Counter requests;     ///< frames sent
+  Counter replies;      ///< good answers
+  Counter statuses;     ///< of these: with a status
+  Counter timeouts;     ///< answers that did not come in time, or were not intact
+  Counter crc_errors;   ///< of these: bytes came, but no frame whose CRC fits
+  Counter exceptions;   ///< requests that the gripper refused
+  Counter faults;       ///< times that the gripper reported a fault that was not there before
+  Counter expired;      ///< queued motions dropped because their time had passed
+  Counter withheld;     ///< queued motions dropped because the gripper was not known to be activated
+  Counter stops;        ///< stop exchanges started
+  Counter activations;  ///< activations started
 };
 
 /// Half duplex: one request is under way at a time. write() queues a cycle - the target if it changed, and at least
@@ -68,9 +71,10 @@ class RobotiqHand final : public HandDriver {
   /// kStop, the stop is latched, or the request is older than half a second; a new session forgets it. Nothing happens
   /// when the gripper is activated and free of faults.
   void request_activation() noexcept;
-  /// The same for the owner of the driver, waiting until it is over. Errors: kRefused (stopped, fault), kTimeout,
-  /// kDisconnected.
-  Status activate(Duration limit = std::chrono::seconds(10));
+  /// The same for the owner of the driver, waiting until it is over. `cancelled` is asked at each turn; then the
+  /// gripper is reset, which ends the activation where the fingers are. Errors: kRefused (stopped, fault, cancelled),
+  /// kTimeout, kDisconnected.
+  Status activate(Duration limit = std::chrono::seconds(10), const std::function<bool()>& cancelled = {});
 
   /// Why a kMove would be refused now, as a sentence; empty when it would not. By the thread that calls write().
   [[nodiscard]] std::string_view why_not() const noexcept;
@@ -87,6 +91,7 @@ class RobotiqHand final : public HandDriver {
   /// The one request under way.
   struct Bus {
     bool waiting{false};
+    bool heard{false};  ///< a byte came since the request
     modbus::Request request;
     Sent sent{Sent::kStatus};
     TimePoint t_sent{};
@@ -141,6 +146,7 @@ class RobotiqHand final : public HandDriver {
   void take_reply(const modbus::Reply& reply, TimePoint now) noexcept;
   void take_status(const modbus::Reply& reply, TimePoint now) noexcept;
   void take_failure(std::uint8_t exception) noexcept;
+  void tell(HandTelemetry& telemetry) const noexcept;
   void send_next(TimePoint now) noexcept;
   bool send_motion(TimePoint now) noexcept;
   void transmit(const modbus::Request& request, Sent what, TimePoint now) noexcept;

@@ -116,7 +116,7 @@ Result<HandInfo> RobotiqHand::probe() {
   return info;
 }
 
-Status RobotiqHand::activate(Duration limit) {
+Status RobotiqHand::activate(Duration limit, const std::function<bool()>& cancelled) {
   const TimePoint deadline = transport::now() + limit;
   HandCommand hold;
   hold.action = HandAction::kHold;
@@ -124,6 +124,11 @@ Status RobotiqHand::activate(Duration limit) {
   static_cast<void>(write(hold, transport::now()));
   request_activation();
   while (transport::now() < deadline) {
+    if (cancelled && cancelled()) {
+      end_session();
+      return make_error(Errc::kRefused, "interrupted: the gripper was reset%s; activate it again",
+                        stop_.acknowledged ? "" : ", but did not answer: watch it");
+    }
     if (write(hold, transport::now()) == IoStatus::kDisconnected)
       return make_error(Errc::kDisconnected, "cannot activate: %s", reason_.empty() ? "no session" : reason_.c_str());
     const bool taken_up = activation_asked_.load(std::memory_order_relaxed) == 0;

@@ -131,6 +131,7 @@ void CanBus::count(const CanErrors& errors) noexcept {
   counters_.protocol_errors += errors.protocol;
   counters_.overflows += errors.overflow;
   counters_.restarts += errors.restarted;
+  counters_.bus_offs += errors.bus_off;
   if (errors.bus_off) {
     end("CAN bus %s: the controller is bus-off: check wiring, termination (120 ohm at both ends) and bit rate");
   }

@@ -19,11 +19,11 @@
 
 namespace embody::transport {
 
-inline constexpr std::size_t kMaxCanFilters = 8;
+inline constexpr std::size_t kMaxCanFilters = 32;
 
 struct CanConfig {
   std::string interface { "can0" };
-  /// Identifiers to receive, 1..8: the kernel hands over nothing else.
+  /// Identifiers to receive, 1..kMaxCanFilters: the kernel hands over nothing else.
   std::vector<CanId> receive;
   /// Other programs on this computer (candump, a simulator on vcan) see what we send. We never do.
   bool local_loopback{true};
@@ -43,6 +43,7 @@ struct CanCounters {
   std::uint64_t protocol_errors{0};
   std::uint64_t overflows{0};
   std::uint64_t restarts{0};
+  std::uint64_t bus_offs{0};
 };
 
 /// An open bus. send() and receive() neither wait nor allocate. Once they said kDisconnected, they say so for ever:

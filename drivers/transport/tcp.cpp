@@ -103,7 +103,24 @@ Received receive(int fd, std::span<std::byte> buffer) noexcept {
   const ssize_t size = ::recv(fd, buffer.data(), buffer.size(), MSG_DONTWAIT);
   if (size > 0) return {IoStatus::kDone, static_cast<std::size_t>(size)};
   if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return {IoStatus::kEmpty, 0};
+  if (size == 0) errno = 0;
   return {IoStatus::kDisconnected, 0};
+}
+
+const char* ending(int error) noexcept {
+  switch (error) {
+    case 0:
+      return "closed the connection";
+    case ECONNRESET:
+      return "reset the connection; was it restarted?";
+    case ETIMEDOUT:
+    case EHOSTUNREACH:
+    case ENETUNREACH:
+    case ENETDOWN:
+      return "no longer answers; check the network and its computer";
+    default:
+      return "broke the connection";
+  }
 }
 
 IoStatus send_message(int fd, std::span<const std::byte> message) noexcept {

@@ -31,8 +31,13 @@ struct Received {
   std::size_t size{0};
 };
 
-/// One recv() without waiting. End of stream and errors other than EAGAIN are kDisconnected.
+/// One recv() without waiting. End of stream and errors other than EAGAIN are kDisconnected; errno is 0 or the error
+/// then.
 [[nodiscard]] Received receive(int fd, std::span<std::byte> buffer) noexcept;
+
+/// How a connection ended, by the errno of receive(), for a sentence that begins with the peer: "closed the
+/// connection".
+[[nodiscard]] const char* ending(int error) noexcept;
 
 /// Hands the whole message to the kernel in one send() without waiting, never raising SIGPIPE.
 /// kEmpty: nothing was sent (buffer full). A partly sent message ends the session: kDisconnected.

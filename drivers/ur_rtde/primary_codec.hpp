@@ -10,7 +10,7 @@ namespace embody::ur {
 using rtde::Bytes;
 
 inline constexpr std::size_t kPrimaryHeader = 5;
-inline constexpr std::size_t kMaxPrimaryMessage = 64 * 1024;  ///< real ones have about 1.5 kB
+inline constexpr std::size_t kMaxPrimaryMessage = std::size_t{64} * 1024;  ///< real ones have about 1.5 kB
 inline constexpr std::uint8_t kRobotState = 16;
 inline constexpr std::uint8_t kRobotMessage = 20;
 inline constexpr std::uint8_t kKinematicsPart = 5;

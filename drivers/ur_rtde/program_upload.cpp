@@ -76,64 +76,77 @@ Status ProgramUpload::service(const SharedArmStatus& status) {
   const ProgramAdvice advice = advise(snapshot.controller, snapshot.answers);
   if (advice.need == ProgramNeed::kNone) {
     last_stop_ = {};
+    confirm_by_ = {};
     return {};
   }
   if (advice.need == ProgramNeed::kWait) {
     if (advice.sentence.detail.empty()) return {};
+    confirm_by_ = {};
     if (last_stop_.empty()) return advice.sentence;
     return make_error(Errc::kRefused, "%s [%s]", advice.sentence.detail.c_str(), last_stop_.c_str());
   }
+  if (awaited()) return wait_for_start();
   // The program ends when no commands arrive: they have to flow before it starts.
   if (!fed) return {};
   if (script_errors_ >= kMostScriptErrors || now() < retry_at_) return last_error_;
-  return heard ? upload(status) : heard;
+  return heard ? upload() : heard;
 }
 
-/// Keeps the connection and takes what it brought.
-Status ProgramUpload::listen() {
+Status ProgramUpload::open() {
   constexpr Duration kConnectTimeout = std::chrono::milliseconds(300);
-  if (!link_.is_open()) {
-    if (const Status opened = link_.open(now() + kConnectTimeout); !opened) {
-      return make_error(opened.error().code, "the control program cannot be loaded: %s", opened.error().detail.c_str());
-    }
-  }
+  if (now() < reopen_at_) return unreachable_;
+  const Status opened = link_.open(now() + kConnectTimeout);
+  if (opened) return opened;
+  reopen_at_ = now() + config_.retry_after;
+  unreachable_ =
+      make_error(opened.error().code, "the control program cannot be loaded: %s", opened.error().detail.c_str());
+  return unreachable_;
+}
+
+/// Keeps the connection and takes what it brought. While a program is awaited, errors are about that program.
+Status ProgramUpload::listen() {
   constexpr int kMostEvents = 100;  // a flood of reports must not hold up the round
+  if (!link_.is_open() && !awaited()) {
+    if (const Status opened = open(); !opened) return opened;
+  }
   for (int i = 0; i < kMostEvents; ++i) {
     const auto event = link_.next_event(now());
     if (!event) break;
-    note(*event);
+    if (!awaited()) {
+      note(*event);
+    } else if (const Status verdict = judge(*event); !verdict) {
+      return verdict;
+    }
   }
   return {};
 }
 
-Status ProgramUpload::upload(const SharedArmStatus& status) {
-  const Status sent = link_.send(config_.program, now() + config_.confirm_timeout);
-  if (!sent) return refuse(sent.error());
+Status ProgramUpload::upload() {
+  constexpr Duration kSendTimeout = std::chrono::milliseconds(50);  // the kernel takes a program of a few kB at once
   ++uploads_;
-  return confirm(status);
+  if (const Status sent = link_.send(config_.program, now() + kSendTimeout); !sent) return refuse(sent.error());
+  confirm_by_ = now() + config_.confirm_timeout;
+  return {};
 }
 
-/// Waits until the program plays; the controller reports what is wrong with it on the same connection.
-Status ProgramUpload::confirm(const SharedArmStatus& status) {
-  constexpr Duration kPoll = std::chrono::milliseconds(10);
-  const TimePoint deadline = now() + config_.confirm_timeout;
-  while (now() < deadline) {
-    if (const auto event = link_.next_event(std::min(now() + kPoll, deadline))) {
-      if (event->kind == MessageKind::kRuntimeException) {
-        script_errors_ = kMostScriptErrors;  // it will not be better the next time
-        return refuse(script_error(*event));
-      }
-      if (event->code == kReadOnly) {
-        return refuse(make_error(Errc::kRefused,
-                                 "the robot is in local control and takes no program (C210): switch it to Remote "
-                                 "Control on the teach pendant"));
-      }
-      note(*event);
-    }
-    const ArmSnapshot snapshot = status.snapshot();
-    if (advise(snapshot.controller, snapshot.answers).need == ProgramNeed::kNone) return {};
-    if (!link_.is_open()) return refuse(make_error(Errc::kDisconnected, "the controller closed its program port"));
+/// What the controller reports about the program that was sent, on the same connection.
+Status ProgramUpload::judge(const PrimaryEvent& event) {
+  if (event.kind == MessageKind::kRuntimeException) {
+    script_errors_ = kMostScriptErrors;  // it will not be better the next time
+    return refuse(script_error(event));
   }
+  if (event.code == kReadOnly) {
+    return refuse(make_error(Errc::kRefused,
+                             "the robot is in local control and takes no program (C210): switch it to Remote "
+                             "Control on the teach pendant"));
+  }
+  note(event);
+  return {};
+}
+
+Status ProgramUpload::wait_for_start() {
+  if (!link_.is_open()) return refuse(make_error(Errc::kDisconnected, "the controller closed its program port"));
+  if (now() < confirm_by_) return {};
   return refuse(make_error(Errc::kTimeout,
                            "the robot does not start the control program: see the log on the teach pendant%s%s",
                            last_stop_.empty() ? "" : "; it reported ", last_stop_.c_str()));
@@ -155,6 +168,8 @@ void ProgramUpload::note(const PrimaryEvent& event) {
 /// A connection that was refused stays read-only even after the switch to remote control: open a new one next time.
 Error ProgramUpload::refuse(const Error& error) {
   link_.close();
+  ++failures_;
+  confirm_by_ = {};
   retry_at_ = now() + config_.retry_after;
   last_error_ = error;
   return error;

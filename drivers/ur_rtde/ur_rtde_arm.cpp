@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "drivers/transport/clock.hpp"
@@ -24,7 +25,18 @@ int unacknowledged_bytes(int fd) noexcept {
 
 }  // namespace
 
-UrRtdeArm::UrRtdeArm(UrRtdeConfig config) : config_(std::move(config)), echo_(config_.echo_patience) {}
+UrRtdeArm::UrRtdeArm(UrRtdeConfig config) : config_(std::move(config)), echo_(config_.echo_patience) {
+  show({{"packages", &counters_.packages},
+        {"missing", &counters_.missing},
+        {"stale", &counters_.stale},
+        {"commands", &counters_.commands},
+        {"refused", &counters_.refused},
+        {"blocked", &counters_.blocked},
+        {"messages", &counters_.messages},
+        {"silences", &counters_.silences},
+        {"uploads", &counters_.uploads},
+        {"upload_failures", &counters_.upload_failures}});
+}
 
 UrRtdeArm::~UrRtdeArm() {
   close_session();
@@ -62,6 +74,7 @@ Result<ArmInfo> UrRtdeArm::connect() {
   controller_time_ = Duration::min();
   t_advanced_ = t_received_ = transport::now();
   echo_.reset(last_sequence_);
+  answers_ = true;
   program_.reset();
   if (config_.upload) {
     program_ = std::make_unique<ur::ProgramUpload>(ur::ProgramUploadConfig{
@@ -78,7 +91,11 @@ Result<ArmInfo> UrRtdeArm::connect() {
 
 Status UrRtdeArm::service() {
   if (program_ != nullptr) {
-    if (const Status done = program_->service(shared_); !done) return done;
+    const auto uploads = program_->uploads(), failures = program_->failures();
+    const Status done = program_->service(shared_);
+    counters_.uploads += program_->uploads() - uploads;
+    counters_.upload_failures += program_->failures() - failures;
+    if (!done) return done;
     if (const auto& reported = program_->kinematics()) {
       if (const Status fits = ur::check_geometry(config_.expected, *reported, session_.version.major); !fits) {
         return fits;
@@ -125,6 +142,7 @@ IoStatus UrRtdeArm::read(ArmState& state) noexcept {
 IoStatus UrRtdeArm::take_frame(const rtde::Frame& frame, ArmState& state) noexcept {
   if (frame.is(PackageType::kText)) {
     if (const auto text = rtde::decode_text(frame.payload)) last_text_ = text->message;
+    ++counters_.messages;
   }
   if (!frame.is(PackageType::kData)) return IoStatus::kEmpty;
   const auto fields = rtde::decode_data(frame.payload, session_.output_id, session_.outputs.size());
@@ -136,11 +154,14 @@ IoStatus UrRtdeArm::take_state(rtde::Bytes fields, ArmState& state) noexcept {
   if (!rtde::decode_state(fields, state)) return end_session("the controller sent values that are not finite");
   if (state.controller_time < controller_time_) return end_session("the controller restarted: its clock went back");
   if (state.controller_time > controller_time_) t_advanced_ = t_received_;
+  count_package(state.controller_time);
   controller_time_ = state.controller_time;
   state.package = ++packages_;
   state.t_arrival = t_received_;
   echo_.seen(state.echo_sequence, t_received_);
   const bool answers = echo_.answers(t_received_);
+  if (!answers && answers_) ++counters_.silences;
+  answers_ = answers;
   if (!answers && state.condition == ArmCondition::kReady) {
     state.condition = ArmCondition::kProgramStopped;
     state.tracking = false;
@@ -150,6 +171,16 @@ IoStatus UrRtdeArm::take_state(rtde::Bytes fields, ArmState& state) noexcept {
   if (settings_offset_ != 0) publish_settings(fields);
   shared_.publish(packages_, status, answers);
   return t_received_ - t_advanced_ > config_.stale_after ? check_clock() : IoStatus::kDone;
+}
+
+/// @pre not before the last package
+void UrRtdeArm::count_package(Duration controller_time) noexcept {
+  ++counters_.packages;
+  if (controller_time_ == Duration::min()) return;
+  const Duration step = controller_time - controller_time_;
+  if (step == Duration::zero()) ++counters_.stale;
+  const auto periods = std::llround(to_seconds(step) * session_.rate_hz);
+  if (periods > 1) counters_.missing += static_cast<std::uint64_t>(periods - 1);
 }
 
 void UrRtdeArm::publish_settings(rtde::Bytes fields) noexcept {
@@ -172,9 +203,11 @@ IoStatus UrRtdeArm::check_clock() noexcept {
 IoStatus UrRtdeArm::write(const ArmCommand& command, TimePoint now) noexcept {
   constexpr int kMostUnacknowledged = 4096;  // 38 commands, 76 ms at 500 Hz
   if (!streaming_) return IoStatus::kDisconnected;
-  if (now > command.t_expires) return IoStatus::kRefused;
   const bool finite = command.q_rad.allFinite() && command.qd_rad_s.allFinite();
-  if (command.action == ArmAction::kTrack && !finite) return IoStatus::kRefused;
+  if (now > command.t_expires || (command.action == ArmAction::kTrack && !finite)) {
+    ++counters_.refused;
+    return IoStatus::kRefused;
+  }
   rtde::encode_command(command, session_.input_id, package_);
   const bool backlog = unacknowledged_bytes(fd_.get()) > kMostUnacknowledged;
   const IoStatus status = backlog ? IoStatus::kEmpty : transport::send_message(fd_.get(), package_);
@@ -183,9 +216,11 @@ IoStatus UrRtdeArm::write(const ArmCommand& command, TimePoint now) noexcept {
     last_sequence_ = command.sequence & rtde::kSequenceMask;
     echo_.sent(last_sequence_, now);
     shared_.count_command();
+    ++counters_.commands;
     blocked_since_ = {};
     return status;
   }
+  ++counters_.blocked;
   if (blocked_since_ == TimePoint{}) blocked_since_ = now;
   if (now - blocked_since_ > config_.backlog_limit) return end_session("commands do not reach the controller any more");
   return status;

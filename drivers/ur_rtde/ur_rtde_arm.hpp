@@ -46,6 +46,20 @@ struct UrRtdeConfig {
   ur::ExpectedInstallation expected;               ///< what service() compares
 };
 
+/// What happened since the driver exists.
+struct UrCounters {
+  Counter packages;         ///< states taken
+  Counter missing;          ///< packages that the controller's clock passed over
+  Counter stale;            ///< packages whose time stamp did not advance
+  Counter commands;         ///< handed to the kernel
+  Counter refused;          ///< commands that had expired or were not finite
+  Counter blocked;          ///< commands dropped because earlier ones were still on the way
+  Counter messages;         ///< texts of the controller
+  Counter silences;         ///< times that the control program left our commands unanswered
+  Counter uploads;          ///< control programs sent
+  Counter upload_failures;  ///< of these: refused, or not seen to start
+};
+
 class UrRtdeArm : public ArmDriver {
  public:
   explicit UrRtdeArm(UrRtdeConfig config);
@@ -59,9 +73,9 @@ class UrRtdeArm : public ArmDriver {
   Result<ArmInfo> connect() override;
 
   /// Loads the control program when the robot runs and nothing plays, and compares arm model, payload and tool centre
-  /// point with the configuration. Waits up to about a second. Errors are sentences for the operator: kRefused (the
-  /// robot is off, stopped, in local control, plays another program; a setting differs), kMalformed (the robot rejects
-  /// the program), kTimeout, kDisconnected.
+  /// point with the configuration. Waits at most 0.3 s, for the connection to the program port. Errors are sentences
+  /// for the operator: kRefused (the robot is off, stopped, in local control, plays another program; a setting
+  /// differs), kMalformed (the robot rejects the program), kTimeout, kDisconnected.
   Status service() override;
 
   /// One package per call, in order. Bytes that break the protocol, joint angles that are not finite, and a
@@ -72,6 +86,7 @@ class UrRtdeArm : public ArmDriver {
   /// command has expired, or tracks a target that is not finite.
   IoStatus write(const ArmCommand& command, TimePoint now) noexcept override;
 
+  [[nodiscard]] const UrCounters& counters() const noexcept { return counters_; }
   /// The last text message of the controller.
   [[nodiscard]] std::string_view last_text() const noexcept { return last_text_.view(); }
   /// Newest modes of the controller, why it limits the speed among them; from any thread.
@@ -86,13 +101,16 @@ class UrRtdeArm : public ArmDriver {
   IoStatus take_frame(const rtde::Frame& frame, ArmState& state) noexcept;
   IoStatus take_state(rtde::Bytes fields, ArmState& state) noexcept;
   void publish_settings(rtde::Bytes fields) noexcept;
+  void count_package(Duration controller_time) noexcept;
   IoStatus check_clock() noexcept;
   IoStatus end_session(std::string_view reason) noexcept;
   void close_session() noexcept;
 
   UrRtdeConfig config_;
+  UrCounters counters_;
   transport::UniqueFd fd_;
   bool streaming_{false};
+  bool answers_{true};  ///< the control program repeated our sequences in the last package
   rtde::FrameBuffer buffer_;
   rtde::Session session_;
   std::size_t time_scale_offset_{0};  ///< of optional fields, 0: the firmware has none

@@ -1,4 +1,4 @@
-// Prints what embodyd shows on DDS: joint states, hand pose, hand state, markers and status.
+// Prints what embodyd shows on DDS: joint states, hand pose, hand state, the robot hand's telemetry, markers and status.
 //   embody-dds-subscriber [--domain N] [--side right] [--count N] [--timeout SECONDS]
 // Ends after --count samples or --timeout seconds (default: never). Exit code 1: not one sample came, or DDS failed.
 // Without $CYCLONEDDS_URI it listens on the loopback only, like the daemon.
@@ -12,7 +12,7 @@
 #include "embody_msgs.h"
 #include "sensor_msgs.h"
 
-enum { kTopics = 5, kBatch = 16 };
+enum { kTopics = 6, kBatch = 16 };
 
 static const char kLoopbackOnly[] =
     "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" "
@@ -70,6 +70,20 @@ static void print_hand_state(const void* sample) {
   printf(" mm, confidence %.2f\n", s->hand_confidence);
 }
 
+static void print_hand_telemetry(const void* sample) {
+  const embody_msgs_msg_dds__HandTelemetry_* s = sample;
+  printf("[%" PRId64 ".%09" PRId64 "] robot hand %s, supply %s:", s->arrival_ns / 1000000000, s->arrival_ns % 1000000000,
+         s->condition, s->supply);
+  const dds_sequence_double* current = s->current_a._length > 0 ? &s->current_a : &s->current_raw;
+  for (uint32_t i = 0; i < s->joint._length; ++i) {
+    printf(" %s %.3f rad", s->joint._buffer[i], s->position_rad._buffer[i]);
+    if (i < current->_length) printf(" %.2f%s", current->_buffer[i], s->current_a._length > 0 ? " A" : " (raw)");
+  }
+  for (uint32_t i = 0; i < s->force._length; ++i)
+    printf(" force%u=%d/%d", s->force._buffer[i].finger, s->force._buffer[i].normal, s->force._buffer[i].tangential);
+  printf("%s%s\n", s->why_not[0] != '\0' ? "; " : "", s->why_not);
+}
+
 static void print_markers(const void* sample) {
   static const char* const kVerdicts[] = {"none", "missing", "used", "relabelled", "jumped", "ghost"};
   const embody_msgs_msg_dds__Markers_* s = sample;
@@ -110,6 +124,7 @@ static const struct topic kTopicList[kTopics] = {
     {"joint_states", true, &sensor_msgs_msg_dds__JointState__desc, print_joint_states},
     {"hand_pose", true, &geometry_msgs_msg_dds__PoseStamped__desc, print_hand_pose},
     {"hand_state", true, &embody_msgs_msg_dds__HandState__desc, print_hand_state},
+    {"hand_telemetry", true, &embody_msgs_msg_dds__HandTelemetry__desc, print_hand_telemetry},
     {"markers", true, &embody_msgs_msg_dds__Markers__desc, print_markers},
     {"status", false, &embody_msgs_msg_dds__Status__desc, print_status},
 };

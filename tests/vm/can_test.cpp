@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "drivers/capture/can_listener.hpp"
+#include "drivers/capture/capture_text.hpp"
+#include "drivers/capture/isotp_messages.hpp"
 #include "drivers/transport/can_isotp.hpp"
 #include "tests/unit/can/rig.hpp"
 
@@ -140,6 +143,53 @@ TEST_P(VmCanTunnel, CarriesTheSerialProtocol) {
     std::printf("[ figures  ] %llu replies, %llu time-outs\n", static_cast<unsigned long long>(hand.counters().replies),
                 static_cast<unsigned long long>(hand.counters().timeouts));
   }
+}
+
+/// What `embodyctl capture hand` does beside embodyd.
+TEST_P(VmCanTunnel, AListenerBesideTheDriverHearsBothSides) {
+  mia::CanTunnelConfig tunnel;
+  tunnel.interface = kHost;
+  tunnel.framing = GetParam();
+  tunnel.message_timeout = milliseconds(200);
+  sim::CanSimulatorConfig simulated;
+  simulated.interface = kHand;
+  simulated.profile = sim::CanProfile::kTunnel;
+  simulated.tunnel = tunnel;
+  sim::MiaCanSimulator simulator(simulated);
+  ASSERT_TRUE(simulator.start().ok());
+  capture::Header header;
+  header.link = capture::LinkKind::kCan;
+  const std::string path = ::testing::TempDir() + "listener.jsonl";
+  auto writer = capture::CaptureWriter::open(path, true, header);
+  ASSERT_TRUE(writer.ok()) << writer.error().detail.view();
+  auto bus = transport::open_can({kHost, {tunnel.tx, tunnel.rx}});
+  ASSERT_TRUE(bus.ok()) << bus.error().detail.view();
+  capture::CanListener listener(**writer);
+  listener.start(std::move(*bus), {tunnel.tx});
+  mia::MiaConfig config;
+  config.device = kHost;
+  config.ack_timeout = milliseconds(200);
+  config.generation = mia::Generation::kAcknowledging;
+  mia::MiaHand hand(config, mia::can_line(tunnel));
+  const auto info = hand.connect();
+  ASSERT_TRUE(info.ok()) << info.error().detail.view();
+  ASSERT_TRUE(drive(hand, info->fd, 0.2, [&] { return hand.counters().replies > 5; })) << hand.reason();
+  ASSERT_TRUE((*writer)->close().ok());
+  auto heard = capture::load_capture(path);
+  ASSERT_TRUE(heard.ok()) << heard.error().detail.view();
+  if (GetParam() == mia::CanFraming::kIsoTp) heard = capture::join_isotp(*heard);
+  ASSERT_TRUE(heard.ok()) << heard.error().detail.view();
+  int sent = 0, received = 0;
+  for (const auto& chunk : heard->chunks) {
+    if (chunk.event != capture::Event::kOut && chunk.event != capture::Event::kIn) continue;
+    const bool out = chunk.event == capture::Event::kOut;
+    const auto id = capture::bytes_of({out ? tunnel.tx : tunnel.rx, 0, {}, {}});
+    EXPECT_TRUE(std::equal(id.begin(), id.end(), chunk.bytes.begin()));
+    ++(out ? sent : received);
+  }
+  EXPECT_GT(sent, 5);
+  EXPECT_GT(received, 5);
+  std::printf("[ figures  ] heard %d of the host, %d of the hand\n", sent, received);
 }
 
 TEST(VmCan, AnInterfaceThatGoesDownEndsTheSessionWithASentenceAndComesBackWithoutMotion) {

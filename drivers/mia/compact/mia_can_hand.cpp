@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "drivers/mia/telemetry.hpp"
 #include "drivers/transport/clock.hpp"
 
 namespace embody::mia::compact {
@@ -18,17 +19,32 @@ constexpr std::size_t at(Motor motor) noexcept {
 
 }  // namespace
 
-MiaCanHand::MiaCanHand(CompactConfig config) : config_(std::move(config)) {}
+MiaCanHand::MiaCanHand(CompactConfig config) : config_(std::move(config)) {
+  show({{"commands", &counters_.commands},
+        {"replies", &counters_.replies},
+        {"timeouts", &counters_.timeouts},
+        {"refusals", &counters_.refusals},
+        {"stray_acks", &counters_.stray_acks},
+        {"no_room", &counters_.no_room},
+        {"damaged", &counters_.damaged},
+        {"lost_states", &counters_.lost_states},
+        {"stops", &counters_.stops},
+        {"under_voltages", &counters_.under_voltages},
+        {"error_frames", &counters_.error_frames},
+        {"bus_offs", &counters_.bus_offs}});
+}
 
 MiaCanHand::~MiaCanHand() {
   end_session();
 }
 
-CompactCounters MiaCanHand::counters() const noexcept {
-  CompactCounters counters = counters_;
-  counters.lost_states = states_.lost();
-  counters.repeated_states = states_.repeated();
-  return counters;
+/// Adds what the parts of this session count by themselves.
+void MiaCanHand::count_parts() noexcept {
+  counters_.lost_states = states_.lost();
+  counters_.repeated_states = states_.repeated();
+  if (!bus_) return;
+  counters_.error_frames = error_frames_before_ + bus_->counters().error_frames;
+  counters_.bus_offs = bus_offs_before_ + bus_->counters().bus_offs;
 }
 
 transport::CanCounters MiaCanHand::bus_counters() const noexcept {
@@ -51,11 +67,40 @@ IoStatus MiaCanHand::read(HandDeviceState& state) noexcept {
   if (lost_) return IoStatus::kDisconnected;
   if (!states_.complete()) return IoStatus::kEmpty;
   state.t_arrival = states_.take_set();
-  state.reply = ++counters_.replies;
+  ++counters_.replies;
+  state.reply = counters_.replies;
   state.joint_count = kMotors;
   const auto q_rad = joint_angles_rad(config_.transmission, states_.counts());
   std::copy(q_rad.begin(), q_rad.end(), state.q_rad.begin());
+  tell(state.t_arrival, state.telemetry);
   return IoStatus::kDone;
+}
+
+/// Hands that report a low supply, a missed heartbeat or lost positions have ended the session: here all is well.
+void MiaCanHand::tell(TimePoint now, HandTelemetry& telemetry) const noexcept {
+  telemetry = {};
+  telemetry.supply = HandSupply::kGood;
+  telemetry.t_current = now;
+  telemetry.current_count = kMotors;
+  bool blocked = false;
+  for (std::size_t i = 0; i < kMotors; ++i) {
+    telemetry.current_raw[i] = states_.state(i).current;
+    blocked = blocked || (states_.state(i).flags & kBlocked) != 0;
+  }
+  const bool has_forces = t_forces_ != TimePoint{} && now - t_forces_ <= TelemetryReader::kFresh;
+  if (has_forces) {
+    std::array<int, kStrainFields> strain{};
+    std::copy(forces_.raw.begin(), forces_.raw.end(), strain.begin());
+    tell_forces(forces_of(strain, TelemetryConfig{}.strain_fields), t_forces_, telemetry);
+  }
+  if (!stop_.may_resume()) {
+    telemetry.condition = HandCondition::kStopped;
+    telemetry.why_not = "the hand was stopped: hold first";
+  } else if (blocked) {
+    telemetry.condition = HandCondition::kHoldsObject;
+  } else {
+    telemetry.condition = HandCondition::kReady;
+  }
 }
 
 IoStatus MiaCanHand::write(const HandCommand& command, TimePoint now) noexcept {
@@ -149,6 +194,7 @@ void MiaCanHand::pump() noexcept {
     }
   }
   if (!lost_) check_times(transport::now(), drained);
+  count_parts();
 }
 
 /// False for a frame that is not what its identifier promises.
@@ -162,12 +208,15 @@ bool MiaCanHand::take_frame(const CanFrame& frame) noexcept {
   verdict = decode(config_.ids, frame, ack);
   if (verdict == Verdict::kGood) take_ack(ack);
   if (verdict != Verdict::kForeign) return verdict == Verdict::kGood;
-  return decode(config_.ids, frame, forces_) == Verdict::kGood;
+  verdict = decode(config_.ids, frame, forces_);
+  if (verdict == Verdict::kGood) t_forces_ = frame.t_arrival;
+  return verdict == Verdict::kGood;
 }
 
 void MiaCanHand::take_state(std::size_t motor, const State& state, TimePoint t) noexcept {
   states_.take(motor, state, t);
   if ((state.flags & kUnderVoltage) != 0) {
+    if (!lost_) ++counters_.under_voltages;
     lose("the hand reports under-voltage: check its supply");
   } else if ((state.flags & kHeartbeatLost) != 0) {
     lose("the hand stopped by itself: it missed our heartbeat");

@@ -30,20 +30,23 @@ struct CompactConfig {
   Transmission transmission;
 };
 
-/// Since the object was made. To be read by the thread that calls read() and write().
+/// Since the object was made.
 struct CompactCounters {
-  std::uint64_t commands{0};    ///< command frames sent, stops included
-  std::uint64_t acks{0};        ///< good ones that were waited for
-  std::uint64_t refusals{0};    ///< acknowledgements that say no
-  std::uint64_t stray_acks{0};  ///< nobody waited for them: late, or of a command replaced meanwhile
-  std::uint64_t timeouts{0};    ///< acknowledgements that did not come in time
-  std::uint64_t no_room{0};     ///< frames that the kernel did not take
-  std::uint64_t damaged{0};     ///< frames with a wrong CRC, length or value
-  std::uint64_t replies{0};     ///< complete sets of states
-  std::uint64_t lost_states{0};
-  std::uint64_t repeated_states{0};
-  std::uint64_t heartbeats{0};
-  std::uint64_t stops{0};  ///< stop exchanges started
+  Counter commands;    ///< command frames sent, stops included
+  Counter acks;        ///< good ones that were waited for
+  Counter refusals;    ///< acknowledgements that say no
+  Counter stray_acks;  ///< nobody waited for them: late, or of a command replaced meanwhile
+  Counter timeouts;    ///< acknowledgements that did not come in time
+  Counter no_room;     ///< frames that the kernel did not take
+  Counter damaged;     ///< frames with a wrong CRC, length or value
+  Counter replies;     ///< complete sets of states
+  Counter lost_states;
+  Counter repeated_states;
+  Counter heartbeats;
+  Counter stops;           ///< stop exchanges started
+  Counter under_voltages;  ///< sessions that ended because the hand's supply was too low
+  Counter error_frames;    ///< of the CAN controller: errors on the bus
+  Counter bus_offs;        ///< times that the controller left the bus
 };
 
 /// write() sends each motor's target when its count changed, and at least once a second; a newer target replaces one
@@ -64,7 +67,7 @@ class MiaCanHand final : public HandDriver {
   IoStatus read(HandDeviceState& state) noexcept override;
   IoStatus write(const HandCommand& command, TimePoint now) noexcept override;
 
-  [[nodiscard]] CompactCounters counters() const noexcept;
+  [[nodiscard]] const CompactCounters& counters() const noexcept { return counters_; }
   /// Of the present or last bus since it was opened: error frames, full queues.
   [[nodiscard]] transport::CanCounters bus_counters() const noexcept;
   [[nodiscard]] bool stopped() const noexcept { return stop_.latched(); }
@@ -102,6 +105,8 @@ class MiaCanHand final : public HandDriver {
   void take_timeout(Exchange& exchange) noexcept;
   void beat(TimePoint now) noexcept;
   IoStatus transmit(Command command, TimePoint now) noexcept;
+  void count_parts() noexcept;
+  void tell(TimePoint now, HandTelemetry& telemetry) const noexcept;
   void lose(std::string_view why) noexcept;
 
   // Commands
@@ -115,6 +120,7 @@ class MiaCanHand final : public HandDriver {
   bool lost_{true};
   bool bus_gone_{true};
   CompactCounters counters_;
+  std::uint64_t error_frames_before_{0}, bus_offs_before_{0};  ///< of earlier sessions
   transport::CanCounters bus_counters_;
   std::array<Exchange, kMotors + 1> exchanges_{};
   std::array<std::uint8_t, kMotors + 1> next_counter_{};
@@ -123,6 +129,7 @@ class MiaCanHand final : public HandDriver {
   StopSequence stop_;
   StateWatch states_;
   Forces forces_;
+  TimePoint t_forces_{};        ///< arrival of forces_; never: none in this session
   bool moving_allowed_{false};  ///< the last command was a motion
   std::uint8_t heartbeat_counter_{0};
   TimePoint next_heartbeat_{};

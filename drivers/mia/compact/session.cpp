@@ -61,6 +61,9 @@ Result<HandInfo> MiaCanHand::connect() {
   auto bus = transport::open_can({config_.interface, received_ids(config_.ids), config_.local_loopback});
   if (!bus) return bus.error();
   bus_.emplace(std::move(*bus));
+  error_frames_before_ = counters_.error_frames;
+  bus_offs_before_ = counters_.bus_offs;
+  t_forces_ = {};
   exchanges_ = {};
   told_ = {};
   stop_ = {};
@@ -72,6 +75,7 @@ Result<HandInfo> MiaCanHand::connect() {
   if (const Status started = start(transport::now() + kProbeTime); !started) {
     lost_ = bus_gone_ = true;  // nothing was moved: nothing to stop
     reason_ = {};
+    count_parts();
     bus_counters_ = bus_->counters();
     bus_.reset();
     return started.error();
@@ -159,6 +163,7 @@ void MiaCanHand::end_session() noexcept {
     }
     reason_ = why;
   }
+  count_parts();
   if (bus_) bus_counters_ = bus_->counters();
   bus_.reset();
   lost_ = bus_gone_ = true;

@@ -2,11 +2,41 @@
 
 #include <array>
 #include <charconv>
+#include <span>
 
 namespace embody::sim {
 namespace {
 
 constexpr std::array<std::string_view, mia::kMotors> kMotorNames{"thumb", "index", "mrl"};
+
+using Help = std::array<const char*, 2>;
+constexpr std::array<Help, 5> kBusHelp{{
+    {"down", "the bus is gone"},
+    {"up", "and comes back"},
+    {"bus_off", "the controller reports bus-off"},
+    {"error_passive", "the controller reports error-passive"},
+    {"no_ack", "the controller reports that nobody acknowledges"},
+}};
+constexpr std::array<Help, 10> kCompactHelp{{
+    {"silent on|off", "obeys, but sends nothing"},
+    {"silent MOTOR on|off", "no states of thumb, index or mrl"},
+    {"drop_ack N", "the next N acknowledgements are not sent"},
+    {"wrong_crc N", "the next N acknowledgements have a wrong checksum"},
+    {"garble N", "the next N states are cut"},
+    {"drop_state N", "the next N states are not sent"},
+    {"counter_stuck on|off", "the counter of the states stands still"},
+    {"undervoltage on|off", "the flag of the supply"},
+    {"restart", "as after a loss of power"},
+    {"calibrate", "positions are known again"},
+}};
+
+void append(std::string& help, std::span<const Help> list) {
+  for (const auto& [words, meaning] : list) {
+    std::string line = words;
+    line.resize(32, ' ');
+    help += line + meaning + "\n";
+  }
+}
 
 std::optional<bool> on_off(std::string_view word) noexcept {
   if (word == "on") return true;
@@ -61,6 +91,13 @@ bool switch_fault(CompactHand& hand, std::string_view name, bool on) noexcept {
 }
 
 }  // namespace
+
+std::string can_fault_help(bool compact) {
+  std::string help;
+  append(help, kBusHelp);
+  if (compact) append(help, kCompactHelp);
+  return help;
+}
 
 std::optional<transport::CanErrors> bus_fault(std::string_view text) noexcept {
   transport::CanErrors errors;

@@ -40,6 +40,27 @@ std::optional<bool> on_or_off(std::string_view text) noexcept {
   return std::nullopt;
 }
 
+constexpr std::array<std::array<const char*, 2>, 18> kHelp{{
+    {"unplug", "the serial device disappears"},
+    {"plug", "and comes back"},
+    {"drop N", "the next N lines are not sent"},
+    {"drop_ack N", "the next N acknowledgements are not sent"},
+    {"garble N", "the next N lines are rubbish"},
+    {"echo_wrong N", "the next N acknowledgements name another command"},
+    {"deaf N", "the next N commands are not heard"},
+    {"rubbish N", "N bytes of rubbish"},
+    {"delay MS", "time from a command to its acknowledgement"},
+    {"jitter MS", "up to MS ms more"},
+    {"mute on|off", "obeys, but sends nothing"},
+    {"half_duplex on|off", "a command before the last one's acknowledgement is dropped"},
+    {"undervoltage on|off", "restarts whenever a motor is to move"},
+    {"reboot", "restarts: the counters are zero where the fingers are"},
+    {"streams off", "no readings by themselves any more"},
+    {"stall MOTOR on|off", "thumb, index or mrl does not move"},
+    {"contact MOTOR COUNTS", "closing meets an object there"},
+    {"contact MOTOR off", "the object is gone"},
+}};
+
 Error refuse(std::string_view text) noexcept {
   return make_error(Errc::kInvalidArgument,
                     "mia fault \"%.*s\" is none of: drop|drop_ack|garble|echo_wrong|deaf|rubbish N, delay|jitter MS, "
@@ -49,6 +70,16 @@ Error refuse(std::string_view text) noexcept {
 }
 
 }  // namespace
+
+std::string mia_fault_help() {
+  std::string help;
+  for (const auto& [words, meaning] : kHelp) {
+    std::string line = words;
+    line.resize(32, ' ');
+    help += line + meaning + "\n";
+  }
+  return help;
+}
 
 Status MiaDevice::fault(std::string_view text, TimePoint now) {
   const Words words = split(text);

@@ -100,4 +100,7 @@ class MiaSimulator {
   std::unique_ptr<Device> device_;
 };
 
+/// The faults by name, for people. One line each: its words, blanks up to column 32, what it does.
+[[nodiscard]] std::string mia_fault_help();
+
 }  // namespace embody::sim

@@ -1,5 +1,6 @@
 #pragma once
 // One simulated motor of a Mia hand: exact solution of its first-order model, for any step in time.
+#include <algorithm>
 #include <limits>
 
 #include "drivers/mia/transmission.hpp"
@@ -31,8 +32,8 @@ class MiaMotor {
   /// The counter tells the truth again.
   void end_calibration() noexcept { zero_ = 0.0; }
 
-  /// Something is in the way of closing further than `counts`; infinity: nothing is.
-  void set_contact(double counts) noexcept { contact_ = counts; }
+  /// Something is in the way of closing further than `counts`, or than where the motor is; infinity: nothing is.
+  void set_contact(double counts) noexcept { contact_ = std::max(counts, counts_); }
   /// Stuck where it is.
   void set_stalled(bool on) noexcept { stalled_ = on; }
 

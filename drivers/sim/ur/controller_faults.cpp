@@ -37,7 +37,6 @@ void set_payload(ControllerLoop& loop, const Argument& argument) {
   loop.set_settings(settings);
 }
 
-// "on" is the fault, "off" the healthy state; but for the program.
 constexpr std::array<Fault, 26> kFaults{{
     {"disconnect", Wants::kNothing, 0, [](auto& loop, auto&) { loop.server().disconnect_all(); }},
     {"reset", Wants::kNothing, 0, [](auto& loop, auto&) { loop.server().disconnect_all(true); }},
@@ -68,6 +67,37 @@ constexpr std::array<Fault, 26> kFaults{{
     {"power-off", Wants::kNothing, 0, [](auto& loop, auto&) { loop.robot().machine().power_off(); }},
     {"payload", Wants::kNumber, 100, set_payload},
     {"speed", Wants::kNumber, 1, [](auto& loop, auto& a) { loop.robot().machine().set_speed_slider(a.number); }},
+}};
+
+// For people. "on" is the fault, "off" the healthy state; but for the program.
+constexpr std::array<std::array<const char*, 2>, 27> kHelp{{
+    {"disconnect", "closes the RTDE connections"},
+    {"reset", "closes them with a TCP reset"},
+    {"restart", "RTDE starts again: its clock is zero, recipes are gone"},
+    {"freeze on|off|SECONDS", "like a pulled cable; sockets stay open, the robot goes on by itself"},
+    {"deaf on|off", "sends packages, takes none"},
+    {"clock on|off", "the time stamp stands still"},
+    {"jitter MS", "each message is up to MS ms late"},
+    {"fragment on|off", "one byte per TCP segment"},
+    {"coalesce N", "N messages travel together"},
+    {"texts on|off", "text messages in the middle of a handshake"},
+    {"in-use SECONDS", "input recipes are refused for so long: another client has them"},
+    {"occupy on|off", "another client has the input registers"},
+    {"remote", "remote control"},
+    {"local", "local control: uploads and dashboard commands are refused"},
+    {"refuse-upload on|off", "a control program that is sent does not start"},
+    {"program on|off", "off: the control program ends; on: it plays again"},
+    {"echo on|off", "the echo of the command in the output registers stands still"},
+    {"protective-stop", "as after a collision"},
+    {"safeguard on|off", "the safeguard input is open"},
+    {"emergency-stop", "the button is pressed"},
+    {"release-emergency-stop", "the button is released; the arm stays without power"},
+    {"violation", "a safety limit was violated"},
+    {"fault", "safety fault of the controller"},
+    {"clear-stop", "ends any stop, powers the arm, plays the program"},
+    {"power-off", "the arm loses its power"},
+    {"payload KG", "the payload of the installation is another"},
+    {"speed FRACTION", "speed slider, 0 to 1"},
 }};
 
 std::string_view take_word(std::string_view& text) noexcept {
@@ -108,6 +138,16 @@ FaultAction action_of(const Fault& fault, std::string_view word) {
 }
 
 }  // namespace
+
+std::string ur_fault_help() {
+  std::string help;
+  for (const auto& [words, meaning] : kHelp) {
+    std::string line = words;
+    line.resize(32, ' ');
+    help += line + meaning + "\n";
+  }
+  return help;
+}
 
 Result<FaultAction> parse_ur_fault(std::string_view line) {
   std::string words(line.substr(0, 200));

@@ -8,7 +8,7 @@ namespace embody::sim {
 namespace {
 
 constexpr std::size_t kMostClients = 16;
-constexpr std::size_t kLongestProgram = 256 * 1024;
+constexpr std::size_t kLongestProgram = std::size_t{256} * 1024;
 
 std::string_view first_line(std::string_view text) noexcept {
   return text.substr(0, text.find('\n'));
@@ -72,7 +72,7 @@ void ScriptPort::send(const Message& message) {
 
 /// False: the client is gone, or sends a program without end.
 bool ScriptPort::read(Client& client, std::vector<std::string>& programs) {
-  std::array<std::byte, 16 * 1024> bytes;
+  std::array<std::byte, std::size_t{16} * 1024> bytes;
   const auto received = transport::receive(client.fd.get(), bytes);
   if (received.status == IoStatus::kDisconnected) return false;
   client.pending.append(reinterpret_cast<const char*>(bytes.data()), received.size);

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "drivers/capture/capture_text.hpp"
+#include "drivers/capture/isotp_messages.hpp"
 
 namespace {
 
@@ -24,6 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (const Chunk& chunk : capture->chunks) {
     if (chunk.bytes.size() > kMaxChunkBytes || chunk.connection == 0) std::abort();
   }
+  static_cast<void>(join_isotp(*capture));
   const auto again = parse_capture(capture_text(*capture));
   if (!again || again->chunks != capture->chunks || !same(again->header, capture->header)) std::abort();
   return 0;

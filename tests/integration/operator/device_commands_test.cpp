@@ -1,8 +1,14 @@
-// `embodyctl arm` and `embodyctl discover` as people and programs call them, against simulated devices.
+// `embodyctl arm`, `embodyctl hand` and `embodyctl discover` as people and programs call them, against simulated
+// devices.
+#include <csignal>
+
 #include "daemon/control/exit_code.hpp"
+#include "daemon/ctl/child_process.hpp"
 #include "drivers/sim/mia/mia_simulator.hpp"
 #include "drivers/sim/robotiq/robotiq_simulator.hpp"
 #include "drivers/sim/ur/ur_controller.hpp"
+#include "drivers/transport/clock.hpp"
+#include "drivers/transport/tcp.hpp"
 #include "drivers/transport/tty.hpp"
 #include "tests/integration/system/rig.hpp"
 
@@ -104,6 +110,68 @@ TEST(HandCommand, CalibratesAMiaAndSaysWhenTheDeviceHasAnOwner) {
   }
   const Finished calibrated = hand("calibrate", config);
   EXPECT_EQ(calibrated.exit_code, kExitOk) << calibrated.output << calibrated.errors;
+}
+
+TEST(HandCommand, ShowsAndTaresBothKindsOfMiaAndMovesNothing) {
+  for (const bool older : {false, true}) {
+    SCOPED_TRACE(older ? "streaming" : "acknowledging");
+    sim::MiaSimulator simulator(older ? sim::older_mia() : sim::MiaSimulatorConfig{});
+    ASSERT_TRUE(simulator.start().ok());
+    const TemporaryFolder folder;
+    const std::string config = hand_config(folder, "mia.toml", simulator.device(), "mia");
+    const Finished shown = hand("show", config);
+    ASSERT_EQ(shown.exit_code, kExitOk) << shown.output << shown.errors;
+    const json result = json::parse(shown.output, nullptr, false)["result"];
+    EXPECT_EQ(result["condition"], "ready") << shown.output;
+    EXPECT_EQ(result["position_rad"].size(), 3U);
+    EXPECT_EQ(result["current_raw"].size(), 3U);
+    EXPECT_EQ(result["force_raw"].size(), 3U);
+    const Finished tared = hand("tare", config);
+    ASSERT_EQ(tared.exit_code, kExitOk) << tared.output << tared.errors;
+    const json zero = json::parse(tared.output, nullptr, false)["result"];
+    EXPECT_EQ(zero["strain_offset"].size(), 8U);
+    EXPECT_NEAR(zero["zero_raw"]["middle"]["normal"].get<double>(), 260.0, 30.0) << "as the simulated hand idles";
+    const Finished text = run_program("embodyctl", {"hand", "show", "--tare", "--config", config}, 60);
+    EXPECT_EQ(text.exit_code, kExitOk) << text.errors;
+    EXPECT_NE(text.output.find("forces"), std::string::npos) << text.output;
+    EXPECT_EQ(simulator.counters().motions, 0U);
+    EXPECT_EQ(simulator.counters().calibrations, 0U);
+  }
+}
+
+TEST(HandCommand, ARobotiqShowsItsCurrentAndHasNoForces) {
+  sim::RobotiqSimulator simulator({});
+  ASSERT_TRUE(simulator.start().ok());
+  const TemporaryFolder folder;
+  const std::string config = hand_config(folder, "robotiq_2f140.toml", simulator.device(), "robotiq");
+  const Finished shown = hand("show", config);
+  ASSERT_EQ(shown.exit_code, kExitOk) << shown.output << shown.errors;
+  const json result = json::parse(shown.output, nullptr, false)["result"];
+  EXPECT_EQ(result["condition"], "not activated");
+  EXPECT_EQ(result["current_a"].size(), 1U);
+  EXPECT_FALSE(result.contains("force_raw"));
+  const Finished tared = hand("tare", config);
+  EXPECT_EQ(tared.exit_code, kExitFailed);
+  EXPECT_NE(tared.output.find("forces"), std::string::npos) << tared.output;
+  EXPECT_EQ(simulator.travelled_counts(), 0.0);
+}
+
+TEST(HandCommand, CtrlCWhileAMiaCalibratesTellsItToStop) {
+  sim::MiaSimulator simulator({});
+  ASSERT_TRUE(simulator.start().ok());
+  const TemporaryFolder folder;
+  const std::string config = hand_config(folder, "mia.toml", simulator.device(), "mia");
+  auto child = ctl::ChildProcess::start(EMBODY_BINARY_DIR "/embodyctl", {"hand", "calibrate", "--config", config},
+                                        folder.file("errors.txt"));
+  ASSERT_TRUE(child.ok());
+  const TimePoint deadline = transport::now() + std::chrono::seconds(20);
+  while (simulator.counters().calibrations == 0 && transport::now() < deadline) {
+    static_cast<void>(transport::wait_readable(-1, transport::now() + milliseconds(5)));
+  }
+  ASSERT_GE(simulator.counters().calibrations, 1U);
+  child->signal(SIGINT);
+  EXPECT_EQ(child->wait(deadline), kExitInterrupted);
+  EXPECT_GE(simulator.counters().stops, 1U);
 }
 
 TEST(DiscoverCommand, AnswersWithAListAndTellsWhenItIsEmpty) {

@@ -59,8 +59,8 @@ TEST(Landmarks, MoveTheRobotAfterOneLineOfConfiguration) {
   EXPECT_EQ(status["counters"]["poses_invalid"], 0);
   EXPECT_EQ(status["counters"]["rt_heap_allocations"], 0);
   EXPECT_GT(status["counters"]["finger_frames"], 200);
-  EXPECT_EQ(status["landmarks"]["malformed"], 0);
-  EXPECT_EQ(status["landmarks"]["duplicates"], 0);
+  EXPECT_EQ(status["devices"]["tracker"]["counters"]["malformed"], 0);
+  EXPECT_EQ(status["devices"]["tracker"]["counters"]["duplicates"], 0);
   EXPECT_NEAR(status["landmarks"]["palm_scale"].get<double>(), 1.0, 0.02);
   for (const char* finger : kFingerNames) {
     EXPECT_LT(status["marker_residual_mm"][finger], 6.0) << finger;
@@ -92,12 +92,12 @@ TEST(Landmarks, GarbageIsCountedAndTheSessionGoesOn) {
     ASSERT_EQ(transport::send_message(socket->get(), std::span(junk).first(i % 2 == 0 ? junk.size() : 7)),
               IoStatus::kDone);
   }
-  EXPECT_TRUE(rig.until([](const json& s) { return s["landmarks"]["malformed"] == 10; }));
+  EXPECT_TRUE(rig.until([](const json& s) { return s["devices"]["tracker"]["counters"]["malformed"] == 10; }));
   ctl::ChildProcess sent = sender(rig, port, {"--loop"});
   EXPECT_TRUE(rig.until([](const json& s) { return s["counters"]["frames_used"] > 10; }));
   const json status = rig.status();
   EXPECT_EQ(status["devices"]["tracker"]["sessions"], 1);
-  EXPECT_EQ(status["landmarks"]["malformed"], 10);
+  EXPECT_EQ(status["devices"]["tracker"]["counters"]["malformed"], 10);
   sent.signal(SIGTERM);
   sent.wait(TimePoint::max());
 }

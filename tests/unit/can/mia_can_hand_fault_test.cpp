@@ -83,6 +83,30 @@ TEST(MiaCanFaults, SurvivesErrorFramesAndSingleLosses) {
   EXPECT_GE(rig.hand->counters().timeouts, 4u);
 }
 
+TEST(MiaCanFaults, TellsCurrentsForcesAndObjectsAndCountsWhatTheBusDoes) {
+  sim::CompactHandConfig simulated;
+  CompactRig rig(patient_compact(), simulated);
+  HandDeviceState& state = rig.loop->state;
+  ASSERT_TRUE(rig.drive([] { return move(0.3, 0.3, 0.3); }, [&] { return state.telemetry.t_force != TimePoint{}; }));
+  EXPECT_EQ(state.telemetry.condition, HandCondition::kReady);
+  EXPECT_EQ(state.telemetry.supply, HandSupply::kGood);
+  EXPECT_FALSE(state.telemetry.current_in_ampere);
+  EXPECT_EQ(state.telemetry.current_count, mia::kMotors);
+  EXPECT_EQ(state.telemetry.force[1].normal, rig.hand->forces().raw[1]) << "the order of the serial line";
+  EXPECT_FALSE(state.telemetry.force[3].measured);
+
+  rig.fault("error_passive");
+  ASSERT_TRUE(rig.drive([] { return move(0.3, 0.3, 0.3); }, [&] { return rig.hand->counters().error_frames == 1; }));
+  rig.fault("bus_off");
+  ASSERT_TRUE(rig.loop->end().has_value());
+  EXPECT_EQ(rig.hand->counters().bus_offs, 1u);
+  rig.connect();
+  EXPECT_EQ(rig.hand->counters().error_frames, 2u) << "counts over sessions";
+  rig.fault("undervoltage on");
+  ASSERT_TRUE(rig.loop->end().has_value());
+  EXPECT_EQ(rig.hand->counters().under_voltages, 1u);
+}
+
 TEST(MiaCanFaults, AHandWithoutHeartbeatsStopsAndSaysSo) {
   CompactRig rig;
   ASSERT_TRUE(rig.drive([] { return move(1.0, 1.0, 1.2); }, [&] { return rig.simulator->motor_counts()[2] > 10.0; }));

@@ -43,7 +43,7 @@ TEST(CanListener, RecordsFramesByWhoSentThemUntilTheBusIsGone) {
   transport::CanBus far(std::move((*pair)[0]), "far", {});
   test::Recording recording(LinkKind::kCan);
   CanListener listener(*recording.writer);
-  listener.start(transport::CanBus(std::move((*pair)[1]), "near", {host, device}), host);
+  listener.start(transport::CanBus(std::move((*pair)[1]), "near", {host, device}), {host});
   std::mt19937 random(23);
   std::vector<CanFrame> sent;
   for (int i = 0; i < 40; ++i) {
@@ -53,6 +53,7 @@ TEST(CanListener, RecordsFramesByWhoSentThemUntilTheBusIsGone) {
   ASSERT_TRUE(test::eventually([&] { return recording.writer->counters().chunks == sent.size(); }));
   { const transport::CanBus gone = std::move(far); }
   ASSERT_TRUE(test::eventually([&] { return listener.over(); }));
+  EXPECT_NE(listener.reason().find("has gone"), std::string_view::npos) << listener.reason();
   const Capture capture = recording.finish();
   ASSERT_EQ(capture.chunks.size(), sent.size() + 2);
   for (std::size_t i = 0; i < sent.size(); ++i) {

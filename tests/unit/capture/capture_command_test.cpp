@@ -8,13 +8,17 @@
 #include "daemon/app/config_io.hpp"
 #include "daemon/app/devices.hpp"
 #include "daemon/control/exit_code.hpp"
+#include "daemon/ctl/capture_can.hpp"
 #include "daemon/ctl/capture_link.hpp"
 #include "daemon/ctl/command.hpp"
+#include "drivers/capture/can_listener.hpp"
 #include "drivers/landmarks/codec.hpp"
 #include "drivers/sim/mia/mia_simulator.hpp"
 #include "drivers/sim/qtm/qtm_server.hpp"
 #include "drivers/sim/ur/ur_controller.hpp"
+#include "drivers/transport/can_double.hpp"
 #include "drivers/transport/udp.hpp"
+#include "drivers/ur_rtde/dashboard.hpp"
 #include "tests/unit/capture/support.hpp"
 
 namespace embody::ctl {
@@ -147,12 +151,99 @@ TEST_F(CaptureCommand, HandIsAskedForPositionsAndDoesNotMove) {
   EXPECT_GT(test::bytes_of(capture, 1, Event::kIn).size(), 300u);
 }
 
+/// Another program's frames on a bus of our own: the listener is the only one there.
+class BusBeside {
+ public:
+  explicit BusBeside(const std::string& path) : listener_(std::move(*transport::double_listen(path))) {}
+  /// Waits for the listener and sends `frames`; what came from it until `done`.
+  std::size_t play(const std::vector<transport::CanFrame>& frames, const std::function<bool()>& done) {
+    transport::UniqueFd fd;
+    EXPECT_TRUE(eventually([&] { return static_cast<bool>(fd = transport::double_accept(listener_.get())); }));
+    transport::CanBus bus(std::move(fd), "bus", {frames.front().id});
+    for (const auto& frame : frames) EXPECT_EQ(bus.send(frame), IoStatus::kDone);
+    EXPECT_TRUE(eventually(done));
+    transport::CanFrame heard;
+    return (bus.receive(heard) == IoStatus::kEmpty ? 0 : 1) + bus.counters().ignored;
+  }
+
+ private:
+  transport::UniqueFd listener_;
+};
+
+TEST_F(CaptureCommand, AHandOnCanIsListenedToAndNothingIsSent) {
+  const std::string bus_path = folder / "bus";
+  const std::string config =
+      configure("", "", "[hand.mia]\nwire = \"can_segments\"\ncan_interface = \"unix:" + bus_path + "\"");
+  BusBeside bus(bus_path);
+  std::size_t sent_by_us = 1;
+  const auto recorded = [this] {  // header, open line and both frames: then Ctrl-C
+    std::ifstream file(output);
+    return std::count(std::istreambuf_iterator<char>(file), {}, '\n') >= 4 && ::kill(::getpid(), SIGINT) == 0;
+  };
+  std::thread others([&] {
+    sent_by_us = bus.play({{{0x340}, 2, {1, 2}, {}}, {{0x7ff}, 1, {9}, {}}, {{0x341}, 1, {3}, {}}}, recorded);
+  });
+  const int exit_code = run({"hand", "--config", config, "-o", output});
+  others.join();
+  EXPECT_TRUE(exit_code == kExitOk || exit_code == kExitUnavailable) << err;  // the others' end goes with them
+  EXPECT_EQ(sent_by_us, 0u);
+  EXPECT_NE(out.find("(can_segments, 0x340 to the hand, 0x341 from it) and sends nothing"), std::string::npos) << out;
+  const auto capture = load();
+  EXPECT_EQ(capture.header.link, capture::LinkKind::kCan);
+  std::vector<capture::Chunk> frames;
+  std::copy_if(capture.chunks.begin(), capture.chunks.end(), std::back_inserter(frames),
+               [](const auto& chunk) { return chunk.event == Event::kIn || chunk.event == Event::kOut; });
+  ASSERT_EQ(frames.size(), 2u) << "0x7ff is not the hand's";
+  EXPECT_EQ(frames[0].event, Event::kOut);
+  EXPECT_EQ(frames[0].bytes, capture::bytes_of({{0x340}, 2, {1, 2}, {}}));
+  EXPECT_EQ(frames[1].event, Event::kIn);
+  EXPECT_EQ(frames[1].bytes, capture::bytes_of({{0x341}, 1, {3}, {}}));
+}
+
+TEST_F(CaptureCommand, ASilentBusAndOneThatEndsAreToldInOneSentence) {
+  const std::string bus_path = folder / "bus";
+  const std::string config =
+      configure("", "", "[hand.mia]\nwire = \"can_compact\"\ncan_interface = \"unix:" + bus_path + "\"");
+  const auto expect_unavailable = [&](const char* duration_s, const char* part) {
+    EXPECT_EQ(run({"hand", "--config", config, "--duration", duration_s, "--force", "-o", output}), kExitUnavailable);
+    EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
+    EXPECT_NE(err.find(part), std::string::npos) << err;
+  };
+  expect_unavailable("1", "no simulated CAN bus");
+  auto listener = transport::double_listen(bus_path);
+  ASSERT_TRUE(listener.ok());
+  expect_unavailable("0.2", "no frame of the hand came by");
+  listener->reset();
+  BusBeside bus(bus_path);
+  std::thread others([&] { bus.play({{{0x210}, 1, {1}, {}}}, [] { return true; }); });
+  expect_unavailable("60", "has gone");
+  others.join();
+}
+
+TEST(CaptureCan, TheIdentifiersAreTheProfilesOwnByWhoSendsThem) {
+  config::MiaHandConfig mia;
+  mia.can_extended_ids = true;
+  mia.wire = config::MiaWire::kCanIsoTp;
+  EXPECT_EQ(can_hand_ids(mia).host, (std::vector<transport::CanId>{{0x340, true}}));
+  EXPECT_EQ(can_hand_ids(mia).hand, (std::vector<transport::CanId>{{0x341, true}}));
+  mia.wire = config::MiaWire::kCanCompact;
+  mia.can_base_id = 0x1fffffe0;
+  const auto ids = can_hand_ids(mia);
+  EXPECT_EQ(ids.host.size(), 5u) << "a command to each motor and to all, and the heartbeat";
+  EXPECT_EQ(ids.host.size() + ids.hand.size(), transport::kMaxCanFilters);
+  for (const auto id : ids.hand) {
+    EXPECT_TRUE(id.valid());
+    EXPECT_EQ(std::count(ids.host.begin(), ids.host.end(), id), 0);
+  }
+}
+
 TEST_F(CaptureCommand, ProxyPrintsWhatToConfigureAndConnectsNothing) {
   sim::UrController controller({});
   ASSERT_TRUE(controller.start().ok());
   const std::string config = configure("", at(controller.port()), "");
   ASSERT_EQ(run({"arm", "--proxy", "--config", config, "--duration", "0.3", "-o", output}), kExitOk) << err;
   EXPECT_NE(out.find("[arm]\nhost = \"127.0.0.1\"\nport = "), std::string::npos) << out;
+  EXPECT_NE(out.find("\ndashboard_port = "), std::string::npos) << out;
   EXPECT_NE(out.find("[arm.program]\nport = "), std::string::npos) << out;
   EXPECT_TRUE(load().chunks.empty());
 }
@@ -162,8 +253,11 @@ TEST_F(CaptureCommand, AWholeRunOfADriverPassesTheProxyWithItsProgram) {
   simulated.robot.program_text.clear();
   sim::UrController controller(simulated);
   ASSERT_TRUE(controller.start().ok());
-  auto config = config::load_config(configure(
-      "", at(controller.port()) + "\n[arm.program]\nport = " + std::to_string(controller.primary_port()), ""));
+  auto config = config::load_config(
+      configure("",
+                at(controller.port()) + "\ndashboard_port = " + std::to_string(controller.dashboard_port()) +
+                    "\n[arm.program]\nport = " + std::to_string(controller.primary_port()),
+                ""));
   ASSERT_TRUE(config.ok()) << config.error().detail.view();
   test::Recording recording(capture::LinkKind::kRtde);
   const auto link = open_capture_link(CapturedDevice::kArm, *config, *recording.writer);
@@ -183,8 +277,17 @@ TEST_F(CaptureCommand, AWholeRunOfADriverPassesTheProxyWithItsProgram) {
     }
     return recording.writer->counters().connections >= 2;
   }));
+  ur::DashboardConfig dashboard;
+  dashboard.host = config->arm.host;
+  dashboard.port = static_cast<std::uint16_t>(config->arm.dashboard_port);
+  const auto mode = ur::Dashboard(dashboard).robot_mode();
+  EXPECT_TRUE(mode.ok()) << mode.error().detail.view();
   const auto capture = recording.finish();
   EXPECT_EQ(capture.chunks.front().port, controller.port());
+  const bool asked = std::any_of(capture.chunks.begin(), capture.chunks.end(), [&](const auto& chunk) {
+    return chunk.event == Event::kOut && text(chunk.bytes) == "robotmode\n";
+  });
+  EXPECT_TRUE(asked) << "the dashboard's text is in the file";
   const bool primary = std::any_of(capture.chunks.begin(), capture.chunks.end(), [&](const auto& chunk) {
     return chunk.event == Event::kOpen && chunk.port == controller.primary_port();
   });
@@ -238,6 +341,9 @@ TEST_F(CaptureCommand, EachFailureIsOneSentenceAndItsExitCode) {
   EXPECT_EQ(run({"arm", "--config", config, "--duration", "0", "-o", output}), kExitUsage);
   EXPECT_EQ(run({"arm", "--config", config}), kExitUsage);
   EXPECT_EQ(run({"legs", "-o", output}), kExitUsage);
+  const std::string by_dds = configure("", "", "driver = \"joint_state\"\n[dds]\nenabled = true");
+  EXPECT_EQ(run({"hand", "--config", by_dds, "--force", "-o", output}), kExitFailed);
+  one_sentence("joint_state");
 }
 
 TEST_F(CaptureCommand, CtrlCEndsItAndTheFileIsWhole) {

@@ -9,14 +9,19 @@
 #include "drivers/capture/capture_writer.hpp"
 #include "drivers/capture/pty_proxy.hpp"
 #include "drivers/capture/tcp_proxy.hpp"
+#include "drivers/mia/can_line.hpp"
+#include "drivers/mia/compact/mia_can_hand.hpp"
 #include "drivers/mia/mia_hand.hpp"
 #include "drivers/qualisys/qualisys_tracker.hpp"
+#include "drivers/sim/mia/can_simulator.hpp"
 #include "drivers/sim/mia/mia_simulator.hpp"
 #include "drivers/sim/qtm/qtm_server.hpp"
 #include "drivers/sim/ur/ur_controller.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
 #include "drivers/ur_rtde/ur_rtde_arm.hpp"
+#include "tests/unit/capture/can_tap.hpp"
+#include "tests/unit/capture/support.hpp"
 
 namespace embody::test {
 namespace {
@@ -75,6 +80,19 @@ std::size_t read_and_close(Driver& driver, int fd, CaptureWriter& writer, Act ac
   return count;
 }
 
+/// As read_and_close(), with kHold whenever the last position has come.
+std::size_t hold_and_close(HandDriver& hand, int fd, CaptureWriter& writer) {
+  std::size_t holds = 0;
+  return read_and_close<HandDeviceState>(hand, fd, writer, [&](std::size_t replies) {
+    if (holds > replies) return;
+    HandCommand hold;
+    hold.t_expires = transport::now() + kPatience;
+    if (hand.write(hold, transport::now()) == IoStatus::kDone) ++holds;
+  });
+}
+
+constexpr std::array<double, mia::kMotors> kStart_counts{30.0, -20.0, 100.0};
+
 }  // namespace
 
 const std::vector<std::string>& captured_markers() {
@@ -123,7 +141,7 @@ std::size_t capture_arm(const std::string& path) {
 
 std::size_t capture_hand(const std::string& path) {
   sim::MiaSimulatorConfig simulated;
-  simulated.start_counts = {30.0, -20.0, 100.0};
+  simulated.start_counts = kStart_counts;
   sim::MiaSimulator simulator(simulated);
   EXPECT_TRUE(simulator.start().ok());
   const auto writer = open_writer(path, LinkKind::kSerial, "simulated Mia hand");
@@ -132,18 +150,58 @@ std::size_t capture_hand(const std::string& path) {
   EXPECT_TRUE(opened.ok()) << opened.error().detail.view();
   mia::MiaConfig config;
   config.device = proxy.device();
+  config.telemetry.every_cycles = kSerialTelemetry_cycles;
   config.ack_timeout = std::chrono::milliseconds(500);
   mia::MiaHand hand(config);
   const auto info = hand.connect();
   EXPECT_TRUE(info.ok()) << info.error().detail.view();
   if (!info) return 0;
-  std::size_t holds = 0;
-  return read_and_close<HandDeviceState>(hand, info->fd, *writer, [&](std::size_t replies) {
-    if (holds > replies) return;
-    HandCommand hold;
-    hold.t_expires = transport::now() + kPatience;
-    if (hand.write(hold, transport::now()) == IoStatus::kDone) ++holds;
-  });
+  return hold_and_close(hand, info->fd, *writer);
+}
+
+std::size_t capture_can_tunnel(const std::string& path) {
+  const TemporaryFolder folder;
+  sim::CanSimulatorConfig simulated;
+  simulated.interface = "unix:" + folder / "hand";
+  simulated.profile = sim::CanProfile::kTunnel;
+  simulated.tunnel.framing = mia::CanFraming::kSegments;
+  simulated.serial_hand.start_counts = kStart_counts;
+  sim::MiaCanSimulator simulator(simulated);
+  EXPECT_TRUE(simulator.start().ok());
+  const auto writer = open_writer(path, LinkKind::kCan, "simulated Mia hand, serial protocol in segments");
+  mia::CanTunnelConfig tunnel = simulated.tunnel;
+  tunnel.interface = "unix:" + folder / "driver";
+  const CanTap tap(tunnel.interface, simulated.interface, {tunnel.tx}, {tunnel.rx}, *writer);
+  mia::MiaConfig config;
+  config.device = tunnel.interface;
+  config.telemetry.every_cycles = kTunnelTelemetry_cycles;
+  config.ack_timeout = std::chrono::milliseconds(500);
+  mia::MiaHand hand(config, mia::can_line(tunnel));
+  const auto info = hand.connect();
+  EXPECT_TRUE(info.ok()) << info.error().detail.view();
+  return info ? hold_and_close(hand, info->fd, *writer) : 0;
+}
+
+std::size_t capture_can_compact(const std::string& path) {
+  const TemporaryFolder folder;
+  sim::CanSimulatorConfig simulated;
+  simulated.interface = "unix:" + folder / "hand";
+  simulated.compact_hand.start_counts = kStart_counts;
+  sim::MiaCanSimulator simulator(simulated);
+  EXPECT_TRUE(simulator.start().ok());
+  const auto writer = open_writer(path, LinkKind::kCan, "simulated Mia hand, compact profile");
+  mia::compact::CompactConfig config;
+  config.interface = "unix:" + folder / "driver";
+  config.ack_timeout = std::chrono::milliseconds(500);
+  config.state_timeout = kPatience;
+  std::vector<transport::CanId> host, device;
+  for (std::uint32_t i = 0; i <= mia::compact::kLastId; ++i)
+    (i <= mia::compact::kHeartbeatId ? host : device).push_back(config.ids.at(i));
+  const CanTap tap(config.interface, simulated.interface, host, device, *writer);
+  mia::compact::MiaCanHand hand(config);
+  const auto info = hand.connect();
+  EXPECT_TRUE(info.ok()) << info.error().detail.view();
+  return info ? hold_and_close(hand, info->fd, *writer) : 0;
 }
 
 }  // namespace embody::test

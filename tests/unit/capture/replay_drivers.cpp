@@ -3,15 +3,20 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "drivers/mia/can_line.hpp"
+#include "drivers/mia/compact/mia_can_hand.hpp"
 #include "drivers/mia/mia_hand.hpp"
 #include "drivers/qualisys/qualisys_tracker.hpp"
 #include "drivers/transport/clock.hpp"
 #include "drivers/transport/tcp.hpp"
 #include "drivers/ur_rtde/ur_rtde_arm.hpp"
+#include "tests/unit/capture/device_captures.hpp"
 
 namespace embody::test {
 namespace {
 
+using capture::CanReplay;
+using capture::CanReplayAs;
 using capture::Capture;
 using capture::ReplayDevice;
 using capture::ReplayOptions;
@@ -61,8 +66,8 @@ bool breaks_off(const Capture& capture) {
 
 /// Connects and reads to the end of the capture or of the session; `act` sends what the driver has to say after so many
 /// readings.
-template <class Reading, class Driver, class Act>
-Replayed run(const Capture& capture, ReplayDevice& device, Driver& driver, Act act) {
+template <class Reading, class Device, class Driver, class Act>
+Replayed run(const Capture& capture, Device& device, Driver& driver, Act act) {
   Replayed result;
   const auto info = driver.connect();
   if (!info) {
@@ -95,6 +100,18 @@ Replayed run(const Capture& capture, ReplayDevice& device, Driver& driver, Act a
 
 constexpr auto kSayNothing = [](std::size_t) {};
 
+/// kHold whenever the last position has come.
+template <class Device>
+Replayed run_hand(const Capture& capture, Device& device, HandDriver& hand) {
+  std::size_t holds = 0;
+  return run<HandDeviceState>(capture, device, hand, [&](std::size_t replies) {
+    if (holds > replies) return;
+    HandCommand hold;
+    hold.t_expires = transport::now() + kPatience;
+    if (hand.write(hold, transport::now()) == IoStatus::kDone) ++holds;
+  });
+}
+
 }  // namespace
 
 Replayed replay_tracker(const Capture& capture, ReplayOptions options, const std::vector<std::string>& markers) {
@@ -126,15 +143,45 @@ Replayed replay_hand(const Capture& capture, ReplayOptions options) {
   if (const Status started = device.start(); !started) return {{}, std::string(started.error().detail.view()), {}};
   mia::MiaConfig config;
   config.device = device.device();
+  config.telemetry.every_cycles = kSerialTelemetry_cycles;
   config.ack_timeout = std::chrono::seconds(2);
   mia::MiaHand hand(config);
-  std::size_t holds = 0;
-  return run<HandDeviceState>(capture, device, hand, [&](std::size_t replies) {
-    if (holds > replies) return;
-    HandCommand hold;
-    hold.t_expires = transport::now() + kPatience;
-    if (hand.write(hold, transport::now()) == IoStatus::kDone) ++holds;
-  });
+  return run_hand(capture, device, hand);
+}
+
+Replayed replay_can_tunnel(const Capture& capture, CanReplayAs as) {
+  CanReplay device(capture, as);
+  if (const Status started = device.start(); !started) return {{}, std::string(started.error().detail.view()), {}};
+  mia::CanTunnelConfig tunnel;
+  tunnel.interface = device.interface();
+  tunnel.framing = as == CanReplayAs::kFrames ? mia::CanFraming::kSegments : mia::CanFraming::kIsoTp;
+  tunnel.message_timeout = kPatience;
+  mia::MiaConfig config;
+  config.device = tunnel.interface;
+  config.telemetry.every_cycles = kTunnelTelemetry_cycles;
+  config.ack_timeout = std::chrono::seconds(2);
+  mia::MiaHand hand(config, mia::can_line(tunnel));
+  return run_hand(capture, device, hand);
+}
+
+Replayed replay_can_compact(const Capture& capture) {
+  mia::compact::CompactConfig config;
+  CanReplay device(capture, CanReplayAs::kFrames, {config.ids.at(mia::compact::kHeartbeatId)});
+  if (const Status started = device.start(); !started) return {{}, std::string(started.error().detail.view()), {}};
+  config.interface = device.interface();
+  config.ack_timeout = std::chrono::seconds(2);
+  config.state_timeout = kPatience;
+  mia::compact::MiaCanHand hand(config);
+  Replayed result = run_hand(capture, device, hand);
+  if (!result.readings.empty()) {
+    const std::string& last = result.readings.back();
+    result.readings = {last.substr(last.find(' '))};  // without the count of readings
+  }
+  const auto& counters = hand.counters();
+  const auto text = [](std::uint64_t count) { return std::to_string(count); };
+  result.readings.push_back(text(counters.damaged) + " damaged, " + text(counters.lost_states) + " lost, " +
+                            text(counters.repeated_states) + " repeated");
+  return result;
 }
 
 std::size_t longest_chunk(const Capture& capture) {

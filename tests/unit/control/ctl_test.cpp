@@ -25,7 +25,8 @@ const std::string kProgram = std::string(EMBODY_BINARY_DIR) + "/embodyctl";
 
 const char* const kStatus = R"({"version":"1.2.3","uptime_s":3725,
   "mode":{"name":"holding","cause":"tracker stale","since_s":2.5,"epoch":7},
-  "devices":{"tracker":{"state":"connected","peer":"127.0.0.1:22223","detail":""},
+  "devices":{"tracker":{"state":"connected","peer":"127.0.0.1:22223","detail":"",
+                        "counters":{"frames":777,"skipped":0}},
              "arm":{"state":"missing","peer":"","detail":"connection refused"}},
   "rates_hz":{"tracker":99.98,"arm":500},
   "counters":{"frames_received":123456,"holds":2},
@@ -34,6 +35,8 @@ const char* const kStatus = R"({"version":"1.2.3","uptime_s":3725,
   "filter":{"lag_ms":{"thumb":400.0,"index":12.5},"lag_at_rest_ms":400,"lag_in_motion_ms":10,
             "predict_ms":0,"predict_pose_ms":40},
   "realtime":{"mode":"try","scheduled":false,"locked":true,"warning":"no rights"},
+  "hand":{"condition":"fault","why_not":"too hot","supply":"low","position_rad":{"j_thumb":0.5},
+          "current_raw":{"j_thumb":321},"force_raw":{"thumb":{"normal":-3,"tangential":4}}},
   "novelty":42})";
 
 const char* const kMarkers = R"({"frame_number":4711,"frames":100,"valid":true,
@@ -284,7 +287,8 @@ TEST(StatusTable, ShowsEverythingThatTheDaemonSaid) {
        {"1.2.3, up 1 h 2 min", "holding (tracker stale), for 2.5 s", "connection refused", "127.0.0.1:22223",
         "tracker 100.0", "frames_received 123456", "80.5", "thumb 5.25",
         "lag thumb 400.0 index 12.5 ms (400 at rest, 10 in motion)", "prediction: fingers off, hand pose 40 ms",
-        "no real-time scheduling, memory locked", "warning: no rights", "novelty 42"}) {
+        "no real-time scheduling, memory locked", "warning: no rights", "novelty 42", "frames 777",
+        "fault, supply low: too hot", "j_thumb 321 (raw)", "thumb -3/4"}) {
     EXPECT_NE(table.find(part), std::string::npos) << part << " is missing in\n" << table;
   }
 }

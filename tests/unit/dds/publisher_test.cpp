@@ -139,6 +139,50 @@ TEST(DdsPublisher, HandStatesArriveExactlyAndWithWallClockStamps) {
   EXPECT_TRUE(m->valid);
 }
 
+TEST(DdsPublisher, HandTelemetryArrivesExactly) {
+  auto publisher = DdsPublisher::create(private_config());
+  ASSERT_TRUE(publisher) << publisher.error().detail.c_str();
+  Reader<embody_msgs_msg_dds__HandTelemetry_> reader(embody_msgs_msg_dds__HandTelemetry__desc,
+                                                     "rt/embody/right/hand_telemetry");
+  const std::vector<std::string> joints{"thumb", "index"};
+  HandDeviceState hand;
+  hand.joint_count = 2;
+  hand.q_rad[1] = 0.5;
+  EXPECT_FALSE(publisher->publish_hand_telemetry(hand, std::span(joints).first(1))) << "another hand's joints";
+  ASSERT_TRUE(publisher->publish_hand_telemetry(hand, joints));
+  const auto* m = reader.next();
+  ASSERT_NE(m, nullptr);
+  EXPECT_EQ(m->arrival_ns, 0);
+  EXPECT_STREQ(m->condition, "unknown");
+  EXPECT_EQ(m->current_a._length + m->current_raw._length + m->force._length, 0U) << "not measured";
+  ASSERT_EQ(m->position_rad._length, 2U);
+  EXPECT_EQ(m->position_rad._buffer[1], 0.5);
+
+  hand.t_arrival = std::chrono::steady_clock::now();
+  hand.telemetry.condition = HandCondition::kFault;
+  hand.telemetry.why_not = "too hot";
+  hand.telemetry.supply = HandSupply::kLow;
+  hand.telemetry.t_current = hand.telemetry.t_force = hand.t_arrival;
+  hand.telemetry.current_count = 2;
+  hand.telemetry.current_raw = {7, 9};
+  hand.telemetry.force[1] = {true, -3, 4};
+  ASSERT_TRUE(publisher->publish_hand_telemetry(hand, joints));
+  m = reader.next();
+  ASSERT_NE(m, nullptr);
+  EXPECT_GT(m->arrival_ns, 0);
+  EXPECT_STREQ(m->condition, "fault");
+  EXPECT_STREQ(m->why_not, "too hot");
+  EXPECT_STREQ(m->supply, "low");
+  EXPECT_STREQ(m->joint._buffer[1], "index");
+  EXPECT_EQ(m->current_a._length, 0U) << "raw numbers are no ampere";
+  ASSERT_EQ(m->current_raw._length, 2U);
+  EXPECT_EQ(m->current_raw._buffer[1], 9.0);
+  ASSERT_EQ(m->force._length, 1U);
+  EXPECT_EQ(m->force._buffer[0].finger, 1);
+  EXPECT_EQ(m->force._buffer[0].normal, -3);
+  EXPECT_EQ(m->force._buffer[0].tangential, 4);
+}
+
 TEST(DdsPublisher, MarkersArriveExactly) {
   auto publisher = DdsPublisher::create(private_config());
   ASSERT_TRUE(publisher) << publisher.error().detail.c_str();
@@ -248,6 +292,7 @@ TEST(DdsPublisher, TopicsAndTypesAreNamedAsRos2NamesThem) {
       {"rt/embody/left/joint_states", "sensor_msgs::msg::dds_::JointState_"},
       {"rt/embody/left/hand_pose", "geometry_msgs::msg::dds_::PoseStamped_"},
       {"rt/embody/left/hand_state", "embody_msgs::msg::dds_::HandState_"},
+      {"rt/embody/left/hand_telemetry", "embody_msgs::msg::dds_::HandTelemetry_"},
       {"rt/embody/left/markers", "embody_msgs::msg::dds_::Markers_"},
       {"rt/embody/status", "embody_msgs::msg::dds_::Status_"}};
   EXPECT_EQ(announced_writers(), expected);

@@ -51,6 +51,36 @@ TEST(MiaMotionWatch, BelievesEverythingThatAHandDoesWhateverItIsTold) {
   }
 }
 
+TEST(MiaMotionWatch, BelievesAHandThatIsToldSeveralTargetsBetweenTwoReadings) {
+  std::mt19937 random(11);
+  std::uniform_int_distribution<int> any_counts(-255, 255), any_way(-25, 25), any_number(0, 3), any_pause(1, 12);
+  for (int run = 0; run < 400; ++run) {
+    constexpr int kSpeed_percent = 15;
+    MotionWatch watch(kSpeed_percent);
+    std::array<sim::MiaMotor, kMotors> motors;
+    Counts counts{};
+    for (std::size_t i = 0; i < kMotors; ++i) motors[i] = sim::MiaMotor(static_cast<Motor>(i), 0.0, 0.04);
+    TimePoint now = kStart;
+    watch.begin(counts, now);
+    for (int step = 0; step < 100; ++step) {
+      for (int left = any_number(random); left >= 0; --left) {
+        for (std::size_t i = 0; i < kMotors; ++i) {
+          // Half of them stay near zero, where a restarted hand would be.
+          const int target = run % 2 == 0 ? any_way(random) : any_counts(random);
+          const int possible = i == 1 ? target : std::abs(target);
+          motors[i].move_to(possible, kSpeed_percent);
+          watch.told(i, possible);
+        }
+        const Duration pause = milliseconds(10 * any_pause(random));
+        now += pause;
+        for (sim::MiaMotor& motor : motors) motor.advance(to_seconds(pause));
+      }
+      for (std::size_t i = 0; i < kMotors; ++i) counts[i] = std::round(motors[i].counter());
+      ASSERT_EQ(watch.take(counts, now), Verdict::kPlausible) << "run " << run << ", step " << step;
+    }
+  }
+}
+
 TEST(MiaMotionWatch, ThrowsOneBrokenReadingAwayAndTakesTwoForARestart) {
   MotionWatch watch(60);
   const Counts here{100, -120, 60};

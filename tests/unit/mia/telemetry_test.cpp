@@ -28,7 +28,7 @@ TEST(MiaTelemetry, AsksForCurrentsAndForcesInTurnEverySoManyCycles) {
     only_forces.count_cycle();
     EXPECT_EQ(only_forces.next_channel(), 'A');
   }
-  TelemetryReader off{TelemetryConfig{}};
+  TelemetryReader off{every(0)};
   off.count_cycle();
   EXPECT_EQ(off.next_channel(), '\0');
 }

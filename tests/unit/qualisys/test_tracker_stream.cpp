@@ -74,6 +74,8 @@ TEST(TrackerStream, LosesNoFrameOf64MarkersAtAnyRate) {
     const auto counters = bench.tracker->counters();
     EXPECT_EQ(counters.frames, frames);
     EXPECT_EQ(counters.skipped + counters.useless + counters.incomplete, 0U);
+    EXPECT_EQ(counters.missing + counters.drains, 0U) << "every frame number came";
+    EXPECT_EQ(counters.label_epochs, 1U);
     std::printf("%.0f Hz, 64 markers: %llu frames, none lost, latest %.2f ms behind the fastest\n", rate_hz,
                 static_cast<unsigned long long>(frames), 1e3 * to_seconds(latest));
   }
@@ -103,6 +105,7 @@ TEST(TrackerStream, IsBackAtTheNewestFrameWithinTwoAfterAStall) {
     before = frame.frame_number;
   }
   EXPECT_GT(bench.tracker->counters().skipped, 2000U);
+  EXPECT_GE(bench.tracker->counters().drains, 1U);
 }
 
 TEST(TrackerStream, KeepsEveryFrameOfAShortStall) {

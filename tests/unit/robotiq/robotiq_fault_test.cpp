@@ -56,6 +56,32 @@ TEST(RobotiqHand, StopThatIsNotAnsweredIsRepeatedAndEndsInAReset) {
   EXPECT_EQ(rig.simulator.counters().activations, 0u);
 }
 
+TEST(RobotiqHand, TellsItsCurrentAndWhatStandsInTheWay) {
+  {
+    RobotiqRig rig(patient_config(), {});
+    ASSERT_TRUE(rig.cycle(RobotiqRig::plain(HandAction::kHold)));
+    EXPECT_EQ(rig.state.telemetry.condition, HandCondition::kNotActivated);
+    EXPECT_EQ(rig.state.telemetry.why_not.view(), rig.hand->why_not());
+    EXPECT_FALSE(rig.state.telemetry.why_not.empty());
+  }
+  RobotiqRig rig;
+  const HandTelemetry& telemetry = rig.state.telemetry;
+  ASSERT_TRUE(rig.cycle(RobotiqRig::plain(HandAction::kHold)));
+  EXPECT_EQ(telemetry.condition, HandCondition::kReady);
+  EXPECT_EQ(telemetry.supply, HandSupply::kGood);
+  EXPECT_TRUE(telemetry.current_in_ampere);
+  EXPECT_EQ(telemetry.current_count, 1u);
+  EXPECT_EQ(telemetry.current_a[0], rig.hand->status().current_a());
+  EXPECT_EQ(telemetry.t_force, TimePoint{}) << "it has no force sensors";
+  rig.inject("fault 10");
+  ASSERT_TRUE(rig.cycle(RobotiqRig::plain(HandAction::kHold)));
+  ASSERT_TRUE(rig.cycle(RobotiqRig::plain(HandAction::kHold)));
+  EXPECT_EQ(telemetry.condition, HandCondition::kFault);
+  EXPECT_EQ(telemetry.supply, HandSupply::kLow);
+  EXPECT_NE(telemetry.why_not.view().find("supply"), std::string_view::npos);
+  EXPECT_EQ(rig.hand->counters().faults, 1u) << "one fault, however often it is told";
+}
+
 TEST(RobotiqHand, DroppedGarbledAndBrokenAnswersAreCountedAndSurvived) {
   for (const char* fault : {"drop 2", "garble 2", "crc 2"}) {
     RobotiqRig rig(quick_config());
@@ -72,6 +98,8 @@ TEST(RobotiqHand, DroppedGarbledAndBrokenAnswersAreCountedAndSurvived) {
     }
     report(fault, transport::now() - start);
     EXPECT_GE(rig.hand->counters().timeouts, timeouts + 2) << fault;
+    const std::uint64_t damaged = fault == std::string_view("crc 2") ? 2 : 0;
+    EXPECT_GE(rig.hand->counters().crc_errors, damaged) << fault;
     ASSERT_TRUE(rig.move_until(0.4, [&rig] { return std::abs(rig.state.q_rad[0] - 0.4) < 0.003; })) << fault;
   }
 }

@@ -30,13 +30,22 @@ struct Moment {
     target.t_capture = now;
     target.joint_count = measured.joint_count = kJoints;
     measured.reply = 1;
+    measured.t_arrival = now;
   }
   void advance(Duration d) {
     now += d;
     mode.t += d;
     target.t_capture += d;
+    measured.t_arrival += d;
   }
   HandCommand step(HandGate& gate) const { return gate.step(now, kPeriod_s, mode, target, measured); }
+  /// The next cycle of a hand that has gone where it was told to.
+  HandCommand follow(HandGate& gate) {
+    advance(milliseconds(50));
+    const HandCommand command = step(gate);
+    if (command.action == HandAction::kMove) measured.q_rad = command.q_rad;
+    return command;
+  }
 };
 
 TEST(HandGate, MovesNoJointFasterThanItsSpeedAndStartsFromTheMeasuredAngles) {
@@ -69,12 +78,42 @@ TEST(HandGate, ReachesATargetAndPassesOnWhenItWasCaptured) {
   Moment moment;
   moment.target.q_rad = {0.7, -0.2, 1.1};
   HandCommand command;
-  for (int cycle = 0; cycle < 20; ++cycle) {
-    moment.advance(milliseconds(50));
-    command = moment.step(gate);
-  }
+  for (int cycle = 0; cycle < 20; ++cycle) command = moment.follow(gate);
   for (std::size_t i = 0; i < kJoints; ++i) EXPECT_DOUBLE_EQ(command.q_rad[i], moment.target.q_rad[i]);
   EXPECT_EQ(command.t_capture, moment.target.t_capture);
+}
+
+TEST(HandGate, NeverLeadsTheMeasuredAnglesByMoreThanTheHandMayGoOnAfterItsLineIsCut) {
+  const HandGateConfig config;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    test::RandomValues random(seed);
+    HandGate gate(config);
+    Moment moment;
+    for (int cycle = 0; cycle < 10'000; ++cycle) {
+      for (std::size_t i = 0; i < kJoints; ++i) {
+        if (random(0.0, 1.0) < 0.1) moment.target.q_rad[i] = random(-1.5, 1.5);
+        if (random(0.0, 1.0) < 0.1) moment.measured.q_rad[i] = random(-1.5, 1.5);  // blocked, free again, pushed
+      }
+      moment.advance(milliseconds(50));
+      const HandCommand command = moment.step(gate);
+      ASSERT_EQ(command.action, HandAction::kMove);
+      for (std::size_t i = 0; i < kJoints; ++i) {
+        ASSERT_LE(std::abs(command.q_rad[i] - moment.measured.q_rad[i]), config.lead_rad + 1e-12)
+            << "seed " << seed << " cycle " << cycle << " joint " << i;
+      }
+    }
+  }
+}
+
+TEST(HandGate, HoldsOnceBetweenAStopAndAMotionHoweverFastTheOperatorEngages) {
+  HandGate gate({});
+  Moment moment;
+  moment.target.q_rad = {1.0, 1.0, 1.0};
+  moment.mode.mode = Mode::kStopped;
+  EXPECT_EQ(moment.step(gate).action, HandAction::kStop);
+  moment.mode.mode = Mode::kEngaged;
+  EXPECT_EQ(moment.step(gate).action, HandAction::kHold) << "a driver stays stopped until it is told to hold";
+  EXPECT_EQ(moment.step(gate).action, HandAction::kMove);
 }
 
 TEST(HandGate, LeavesAJointAloneWhoseTargetIsNotANumber) {
@@ -165,13 +204,12 @@ TEST(HandGate, AJointThatIsNotSureKeepsItsLastTargetWhileTheOthersGoOn) {
     moment.target.hand_confidence = 1.0;
     moment.target.joint_confidence.fill(1.0);
     moment.target.q_rad = {0.5, 0.5, 0.5};
-    HandCommand command = moment.step(gate);
+    HandCommand command = moment.follow(gate);
     EXPECT_EQ(gate.kept_joints(), 0U);
     moment.target.joint_confidence[1] = unsure;
     moment.target.q_rad = {1.0, 1.0, 1.0};
     for (int cycle = 0; cycle < 40; ++cycle) {
-      moment.advance(milliseconds(50));
-      command = moment.step(gate);
+      command = moment.follow(gate);
       ASSERT_EQ(command.action, HandAction::kMove);
       ASSERT_EQ(gate.kept_joints(), 2U) << "bit of joint 1";
     }
@@ -179,10 +217,7 @@ TEST(HandGate, AJointThatIsNotSureKeepsItsLastTargetWhileTheOthersGoOn) {
     EXPECT_DOUBLE_EQ(command.q_rad[1], 0.5) << "confidence " << unsure;
     EXPECT_DOUBLE_EQ(command.q_rad[2], 1.0);
     moment.target.joint_confidence[1] = 0.2;
-    for (int cycle = 0; cycle < 40; ++cycle) {
-      moment.advance(milliseconds(50));
-      command = moment.step(gate);
-    }
+    for (int cycle = 0; cycle < 40; ++cycle) command = moment.follow(gate);
     EXPECT_DOUBLE_EQ(command.q_rad[1], 1.0) << "sure again, it catches up";
     EXPECT_EQ(gate.kept_joints(), 0U);
   }
@@ -229,6 +264,8 @@ TEST(HandGate, EachReasonToHoldHasItsName) {
   EXPECT_EQ(reason_after([](Moment& m) { m.mode.mode = Mode::kAligned; }), HandHold::kMode);
   EXPECT_EQ(reason_after([](Moment& m) { m.measured.reply = 0; }), HandHold::kNoAnswer);
   EXPECT_EQ(reason_after([](Moment& m) { m.measured.q_rad[2] = kNan; }), HandHold::kNoAnswer);
+  EXPECT_EQ(reason_after([](Moment& m) { m.measured.t_arrival -= milliseconds(150); }), HandHold::kNone);
+  EXPECT_EQ(reason_after([](Moment& m) { m.measured.t_arrival -= milliseconds(151); }), HandHold::kNoAnswer);
   EXPECT_EQ(reason_after([](Moment& m) { m.target.valid = false; }), HandHold::kNotSeen);
   EXPECT_EQ(reason_after([](Moment& m) { m.target.t_capture -= milliseconds(501); }), HandHold::kTargetStale);
 }

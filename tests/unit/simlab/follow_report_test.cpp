@@ -65,10 +65,11 @@ FollowReport judge_scene(const Scene& scene) {
     sample.program_state = scene.tracking(t) ? ProgramState::kTracking : ProgramState::kHold;
     arm.push_back(sample);
   }
-  std::vector<MiaSample> hand;
+  std::vector<HandSample> hand;
   for (double t = -1.0; t < scene.hand_log_end_s; t += 0.01) {
-    MiaSample sample;
+    HandSample sample;
     sample.t = kStart + from_seconds(t);
+    sample.count = 3;
     for (std::size_t motor = 0; motor < 3; ++motor) sample.q_rad[motor] = scene.finger(t, motor);
     hand.push_back(sample);
   }

@@ -113,6 +113,20 @@ TEST(PoseMonitor, CountsAJumpBeforeItsFirstPoseIsAccepted) {
   EXPECT_EQ(stream.step(kThere).jumps, 1U);
 }
 
+TEST(PoseMonitor, CountsEveryJumpThatLastsHoweverSmallAndNeverTakesItForMotion) {
+  for (const int period_ms : {2, 10, 16, 33}) {
+    for (double jump_m = 0.02 + 5.0 * period_ms * 1e-3; jump_m < 1.0; jump_m *= 1.3) {
+      Stream stream;
+      for (int k = 0; k < 10; ++k) (void)stream.step(kHere, milliseconds(period_ms));
+      const std::uint32_t before = stream.step(kHere, milliseconds(period_ms)).jumps;
+      HandPose pose;
+      for (int k = 0; k < 20 && !pose.valid; ++k) pose = stream.step({jump_m, 0.0, 0.0}, milliseconds(period_ms));
+      EXPECT_TRUE(pose.valid);
+      EXPECT_EQ(pose.jumps, before + 1) << jump_m << " m at " << period_ms << " ms";
+    }
+  }
+}
+
 TEST(PoseMonitor, NeverAcceptsJumpsThatDoNotAgree) {
   Stream stream;
   for (int k = 0; k < 10; ++k) stream.step(kHere);

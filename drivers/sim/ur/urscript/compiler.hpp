@@ -14,7 +14,7 @@
 
 namespace embody::sim::urscript {
 
-inline constexpr std::size_t kMaxText = 256 * 1024;  ///< bytes
+inline constexpr std::size_t kMaxText = std::size_t{256} * 1024;  ///< bytes
 inline constexpr std::size_t kMaxInstructions = 65'536;
 inline constexpr int kMaxNesting = 48;             ///< of blocks and brackets together
 inline constexpr std::size_t kMaxVariables = 256;  ///< of the program, and of each function
