@@ -108,7 +108,8 @@ class CsvParser {
 
 std::string format_csv(const Trajectory& trajectory, char separator) {
   std::string text;
-  for (const auto& [key, value] : about(trajectory)) text += "# " + key + ": " + value + "\n";
+  for (const auto& [key, value] : about(trajectory))
+    text.append("# ").append(key).append(": ").append(value).append("\n");
   const std::vector<std::string> names = column_names(trajectory);
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (i > 0) text += separator;
