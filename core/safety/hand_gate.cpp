@@ -4,6 +4,14 @@
 #include <cmath>
 
 namespace embody::safety {
+namespace {
+
+bool all_finite(const HandDeviceState& state) noexcept {
+  return std::all_of(state.q_rad.begin(), state.q_rad.begin() + static_cast<std::ptrdiff_t>(state.joint_count),
+                     [](double q_rad) { return std::isfinite(q_rad); });
+}
+
+}  // namespace
 
 const char* to_string(HandHold hold) noexcept {
   switch (hold) {
@@ -31,12 +39,10 @@ HandHold HandGate::obstacle(TimePoint now, const ModeState& mode, const FingerTa
   if (now - mode.t > config_.mode_timeout) return HandHold::kModeStale;
   if (mode.mode != Mode::kEngaged) return HandHold::kMode;
   if (measured.reply == 0 || now - measured.t_arrival > config_.measured_timeout) return HandHold::kNoAnswer;
+  if (!all_finite(measured)) return HandHold::kNoAnswer;
   if (!target.valid || target.joint_count != measured.joint_count) return HandHold::kNotSeen;
   if (now - target.t_capture > config_.target_timeout) return HandHold::kTargetStale;
   if (!sure(target.hand_confidence)) return HandHold::kUnsure;
-  for (std::size_t i = 0; !following_ && i < measured.joint_count; ++i) {
-    if (!std::isfinite(measured.q_rad[i])) return HandHold::kNoAnswer;  // nowhere to start from
-  }
   return HandHold::kNone;
 }
 
@@ -64,9 +70,7 @@ HandCommand HandGate::step(TimePoint now, double dt_s, const ModeState& mode, co
       goal_rad_[i] = target.q_rad[i];
     }
     q_rad_[i] += std::clamp(goal_rad_[i] - q_rad_[i], -step, step);
-    const double q_measured_rad = measured.q_rad[i];
-    if (std::isfinite(q_measured_rad))
-      q_rad_[i] = std::clamp(q_rad_[i], q_measured_rad - config_.lead_rad, q_measured_rad + config_.lead_rad);
+    q_rad_[i] = std::clamp(q_rad_[i], measured.q_rad[i] - config_.lead_rad, measured.q_rad[i] + config_.lead_rad);
   }
   command.action = HandAction::kMove;
   command.q_rad = q_rad_;

@@ -48,6 +48,25 @@ struct Moment {
   }
 };
 
+TEST(HandGate, HoldsWhileAMeasuredAngleIsNoNumberAndGoesOnFromTheNextOnes) {
+  for (const double nonsense : {kNan, std::numeric_limits<double>::infinity()}) {
+    HandGate gate({});
+    Moment moment;
+    moment.target.q_rad.fill(1.0);
+    for (int i = 0; i < 3; ++i) ASSERT_EQ(moment.follow(gate).action, HandAction::kMove);
+    const auto q_rad = moment.measured.q_rad;
+    moment.measured.q_rad[1] = nonsense;
+    EXPECT_EQ(moment.follow(gate).action, HandAction::kHold);
+    EXPECT_EQ(gate.hold(), HandHold::kNoAnswer);
+    moment.measured.q_rad = q_rad;
+    const HandCommand command = moment.follow(gate);
+    ASSERT_EQ(command.action, HandAction::kMove);
+    for (std::size_t i = 0; i < kJoints; ++i) {
+      EXPECT_LE(std::abs(command.q_rad[i] - q_rad[i]), HandGateConfig{}.speed_rad_s * kPeriod_s + 1e-12);
+    }
+  }
+}
+
 TEST(HandGate, MovesNoJointFasterThanItsSpeedAndStartsFromTheMeasuredAngles) {
   const HandGateConfig config;
   for (const std::uint64_t seed : {1, 2, 3}) {
