@@ -87,10 +87,13 @@ Cell::~Cell() {
 Status Cell::start_devices(TrackerKind tracker, HandKind hand) {
   tracker_ = make_tracker(tracker);
   if (const Status started = tracker_->start(); !started) return started;
-  hand_ = make_hand(hand, folder_ + "/hand");
-  if (const Status started = hand_->start(); !started) return started;
   const auto config = config::parse_config(toml(folder_, *tracker_, nullptr, hand), "embody.toml", folder_);
   if (!config) return config.error();
+  sim::HandOptions options;
+  options.link = folder_ + "/hand";
+  if (hand == HandKind::kStreamingMia) options.mia_generation = mia::Generation::kStreaming;
+  hand_ = sim::make_simulated_hand(*config, options);
+  if (const Status started = hand_->start(); !started) return started;
   const auto q_start = first_joints(*config);
   if (!q_start) return q_start.error();
 
@@ -213,6 +216,13 @@ bool Cell::ask(control::Command command) {
   request.command = command;
   const auto response = client_->request(request, seconds(5));
   return response && response->ok;
+}
+
+std::uint64_t Cell::hand_motions() const {
+  for (const sim::HandCounter& counter : hand_->counters()) {
+    if (std::string_view(counter.name) == "motions") return counter.value;
+  }
+  return 0;
 }
 
 std::string Cell::new_log() {

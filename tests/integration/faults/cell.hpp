@@ -7,6 +7,7 @@
 
 #include "daemon/control/control_client.hpp"
 #include "daemon/ctl/child_process.hpp"
+#include "daemon/simlab/simulated_hand.hpp"
 #include "drivers/sim/ur/ur_controller.hpp"
 #include "drivers/ur_rtde/dashboard.hpp"
 #include "tests/integration/faults/devices.hpp"
@@ -46,7 +47,9 @@ class Cell {
   [[nodiscard]] int daemons_started() const noexcept { return daemons_started_; }
 
   sim::UrController& arm() { return *arm_; }
-  SimulatedHand& hand() { return *hand_; }
+  [[nodiscard]] sim::SimulatedHand& hand() { return *hand_; }
+  /// Motion commands that the hand has obeyed so far.
+  [[nodiscard]] std::uint64_t hand_motions() const;
   [[nodiscard]] const CellLimits& limits() const noexcept { return limits_; }
   /// What the daemon has logged since the last call.
   [[nodiscard]] std::string new_log();
@@ -65,7 +68,7 @@ class Cell {
   CellLimits limits_;
   std::unique_ptr<SimulatedTracker> tracker_;
   std::unique_ptr<sim::UrController> arm_;
-  std::unique_ptr<SimulatedHand> hand_;
+  std::unique_ptr<sim::SimulatedHand> hand_;
   std::optional<ctl::ChildProcess> daemon_;
   std::optional<control::ControlClient> client_;
   bool suspended_{false};

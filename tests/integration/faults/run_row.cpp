@@ -49,7 +49,7 @@ class Run {
     const TimePoint t = now();
     if (t_look_ != TimePoint{}) line_.longest_gap = std::max(line_.longest_gap, t - t_look_);
     t_look_ = t;
-    HandSample hand{t, cell_.hand().angles_rad(), cell_.hand().motions()};
+    HandSample hand{t, cell_.hand().joint_angles_rad(), cell_.hand_motions()};
     line_.hand.push_back(std::move(hand));
     if (line_.hand.size() % 2 == 0) look_at_daemon();
     std::this_thread::sleep_until(t + kLook);
