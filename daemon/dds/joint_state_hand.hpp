@@ -48,7 +48,7 @@ struct JointStateHandCounters {
 /// for a real-time thread: run the hand loop of such a hand without SCHED_FIFO.
 ///
 /// kMove is refused when expired, not finite, of a wrong joint count, or while stopped. kHold publishes nothing. kStop
-/// latches and, if this session has moved the hand, publishes the last measured position once (or nothing, as
+/// latches and, if the present connection has moved the hand, publishes the last measured position once (or nothing, as
 /// configured): that is not a standstill at once, the hand goes back to where it was measured, at its own pace. The
 /// latch opens on connect(), or on a kMove after a kHold. The destructor does what kStop does.
 class JointStateHand final : public HandDriver {

@@ -15,6 +15,7 @@
 #include "daemon/dds/publisher.hpp"
 #include "daemon/simlab/hands.hpp"
 #include "daemon/simlab/motion_log.hpp"
+#include "drivers/sim/fault_help.hpp"
 #include "drivers/transport/clock.hpp"
 #include "sensor_msgs.h"
 
@@ -105,11 +106,7 @@ class DdsHand final : public SimulatedHand {
   }
   [[nodiscard]] std::string fault_help() const override {
     std::string help;
-    for (const auto& [name, meaning] : kFaultWords) {
-      std::string line = std::string(name) + " on|off";
-      line.resize(32, ' ');
-      help += line + meaning + "\n";
-    }
+    for (const auto& [name, meaning] : kFaultWords) add_fault_help(help, std::string(name) + " on|off", meaning);
     return help;
   }
 

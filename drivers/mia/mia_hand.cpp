@@ -24,7 +24,7 @@ constexpr std::size_t at(Motor motor) noexcept {
 
 }  // namespace
 
-MiaHand::MiaHand(MiaConfig config) : MiaHand(config, serial_line(config.device)) {}
+MiaHand::MiaHand(const MiaConfig& config) : MiaHand(config, serial_line(config.device)) {}
 
 MiaHand::MiaHand(MiaConfig config, OpenLine open)
     : config_(std::move(config)), open_(std::move(open)), watch_(config_.speed_percent), telemetry_(config_.telemetry) {

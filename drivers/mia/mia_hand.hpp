@@ -34,7 +34,7 @@ namespace embody::mia {
 class MiaHand final : public HandDriver {
  public:
   /// On the serial line `config.device`.
-  explicit MiaHand(MiaConfig config);
+  explicit MiaHand(const MiaConfig& config);
   /// On the wire that `open` opens; `config.device` is its name for people.
   MiaHand(MiaConfig config, OpenLine open);
   ~MiaHand() override;

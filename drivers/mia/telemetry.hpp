@@ -75,7 +75,8 @@ class TelemetryReader {
   void count_cycle() noexcept;
   /// Channel to ask for now ('C' or 'A'), or '\0'. Asking takes the turn.
   [[nodiscard]] char next_channel() noexcept;
-  /// The hand did not answer; a channel that is silent three times in a row is not asked again in this session.
+  /// The hand did not answer; a channel that is silent three times in a row is not asked again before the next
+  /// connect().
   void missed(char channel) noexcept;
   [[nodiscard]] bool wants(char channel) const noexcept;
 

@@ -97,7 +97,7 @@ class QualisysTracker final : public HandTracker {
   QualisysConfig config_;
   Wanted wanted_;
   QualisysCounters counters_;
-  QualisysCounters before_;  ///< when this session began
+  QualisysCounters before_;  ///< at the last connect()
   std::unique_ptr<Session> session_;
   std::uint32_t label_epoch_{0};
 };

@@ -175,7 +175,7 @@ void QualisysTracker::count_missing(std::uint64_t frame_number) noexcept {
   counters_.missing += frame_number - last - 1;
 }
 
-/// Adds what the parts of this session count by themselves.
+/// Adds what the parts of the connection count by themselves.
 void QualisysTracker::count_session() noexcept {
   const Session& session = *session_;
   counters_.useless = before_.useless + session.assembler.useless();

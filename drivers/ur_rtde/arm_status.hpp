@@ -8,8 +8,8 @@
 namespace embody::ur {
 
 struct ArmSnapshot {
-  std::uint64_t packages{0};  ///< of this session; 0: nothing known yet
-  std::uint64_t commands{0};  ///< sent in this session
+  std::uint64_t packages{0};  ///< since connect(); 0: nothing known yet
+  std::uint64_t commands{0};  ///< sent since connect()
   rtde::ControllerStatus controller;
   bool answers{true};  ///< the program repeats our sequences
 };

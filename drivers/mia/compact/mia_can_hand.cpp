@@ -38,7 +38,7 @@ MiaCanHand::~MiaCanHand() {
   end_session();
 }
 
-/// Adds what the parts of this session count by themselves.
+/// Adds what the parts of the connection count by themselves.
 void MiaCanHand::count_parts() noexcept {
   counters_.lost_states = states_.lost();
   counters_.repeated_states = states_.repeated();

@@ -129,7 +129,7 @@ class MiaCanHand final : public HandDriver {
   StopSequence stop_;
   StateWatch states_;
   Forces forces_;
-  TimePoint t_forces_{};        ///< arrival of forces_; never: none in this session
+  TimePoint t_forces_{};        ///< arrival of forces_; never: none since connect()
   bool moving_allowed_{false};  ///< the last command was a motion
   std::uint8_t heartbeat_counter_{0};
   TimePoint next_heartbeat_{};

@@ -1,4 +1,5 @@
 #include "drivers/sim/mia/can_faults.hpp"
+#include "drivers/sim/fault_help.hpp"
 
 #include <array>
 #include <charconv>
@@ -31,11 +32,7 @@ constexpr std::array<Help, 10> kCompactHelp{{
 }};
 
 void append(std::string& help, std::span<const Help> list) {
-  for (const auto& [words, meaning] : list) {
-    std::string line = words;
-    line.resize(32, ' ');
-    help += line + meaning + "\n";
-  }
+  for (const auto& [words, meaning] : list) add_fault_help(help, words, meaning);
 }
 
 std::optional<bool> on_off(std::string_view word) noexcept {

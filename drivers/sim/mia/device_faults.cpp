@@ -3,6 +3,7 @@
 #include <charconv>
 #include <limits>
 
+#include "drivers/sim/fault_help.hpp"
 #include "drivers/sim/mia/device.hpp"
 
 namespace embody::sim {
@@ -73,11 +74,7 @@ Error refuse(std::string_view text) noexcept {
 
 std::string mia_fault_help() {
   std::string help;
-  for (const auto& [words, meaning] : kHelp) {
-    std::string line = words;
-    line.resize(32, ' ');
-    help += line + meaning + "\n";
-  }
+  for (const auto& [words, meaning] : kHelp) add_fault_help(help, words, meaning);
   return help;
 }
 

@@ -1,4 +1,5 @@
 #include "drivers/sim/qtm/fault_words.hpp"
+#include "drivers/sim/fault_help.hpp"
 
 #include <algorithm>
 #include <array>
@@ -175,11 +176,7 @@ Result<Fault> parse_qtm_fault(std::string_view text) {
 
 std::string fault_help() {
   std::string help;
-  for (const Grammar& grammar : kGrammar) {
-    std::string usage = grammar.usage;
-    usage.resize(std::max<std::size_t>(usage.size() + 1, 32), ' ');
-    help += usage + grammar.meaning + "\n";
-  }
+  for (const Grammar& grammar : kGrammar) add_fault_help(help, grammar.usage, grammar.meaning);
   return help;
 }
 

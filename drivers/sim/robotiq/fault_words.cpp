@@ -1,4 +1,5 @@
 #include "drivers/sim/robotiq/fault_words.hpp"
+#include "drivers/sim/fault_help.hpp"
 
 #include <algorithm>
 #include <array>
@@ -96,11 +97,7 @@ Result<RobotiqFault> parse_robotiq_fault(std::string_view words) {
 
 std::string robotiq_fault_help() {
   std::string text;
-  for (const Grammar& grammar : kGrammar) {
-    std::string usage(grammar.usage);
-    usage.resize(std::max<std::size_t>(usage.size() + 1, 16), ' ');
-    text += usage + grammar.meaning + "\n";
-  }
+  for (const Grammar& grammar : kGrammar) add_fault_help(text, grammar.usage, grammar.meaning);
   return text;
 }
 

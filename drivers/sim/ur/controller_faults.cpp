@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "drivers/sim/fault_help.hpp"
 #include "drivers/sim/ur/controller_loop.hpp"
 #include "drivers/transport/clock.hpp"
 
@@ -141,11 +142,7 @@ FaultAction action_of(const Fault& fault, std::string_view word) {
 
 std::string ur_fault_help() {
   std::string help;
-  for (const auto& [words, meaning] : kHelp) {
-    std::string line = words;
-    line.resize(32, ' ');
-    help += line + meaning + "\n";
-  }
+  for (const auto& [words, meaning] : kHelp) add_fault_help(help, words, meaning);
   return help;
 }
 
