@@ -1,4 +1,5 @@
-// Prints what embodyd shows on DDS: joint states, hand pose, hand state, the robot hand's telemetry, markers and status.
+// Prints what embodyd shows on DDS: joint states, hand pose, hand state, the robot hand's telemetry, markers and
+// status.
 //   embody-dds-subscriber [--domain N] [--side right] [--count N] [--timeout SECONDS]
 // Ends after --count samples or --timeout seconds (default: never). Exit code 1: not one sample came, or DDS failed.
 // Without $CYCLONEDDS_URI it listens on the loopback only, like the daemon.
@@ -72,8 +73,8 @@ static void print_hand_state(const void* sample) {
 
 static void print_hand_telemetry(const void* sample) {
   const embody_msgs_msg_dds__HandTelemetry_* s = sample;
-  printf("[%" PRId64 ".%09" PRId64 "] robot hand %s, supply %s:", s->arrival_ns / 1000000000, s->arrival_ns % 1000000000,
-         s->condition, s->supply);
+  printf("[%" PRId64 ".%09" PRId64 "] robot hand %s, supply %s:", s->arrival_ns / 1000000000,
+         s->arrival_ns % 1000000000, s->condition, s->supply);
   const dds_sequence_double* current = s->current_a._length > 0 ? &s->current_a : &s->current_raw;
   for (uint32_t i = 0; i < s->joint._length; ++i) {
     printf(" %s %.3f rad", s->joint._buffer[i], s->position_rad._buffer[i]);
