@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "daemon/control/exit_code.hpp"
 #include "daemon/ctl/command.hpp"
@@ -29,6 +31,14 @@ constexpr const char* kFooter =
     "Exit codes: 0 done, 1 failed, 2 usage, 3 refused in this mode, 4 the robot did not follow,\n"
     "69 daemon or device not there, 77 not permitted, 78 configuration, 130 interrupted.";
 
+/// A subcommand is missing where a word stands that is none: CLI11 says the first only. Empty: no word.
+std::string misplaced_word(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  const std::vector<std::string> words = command->remaining();
+  return words.empty() ? "" : words.front();
+}
+
 int run(int argc, char** argv) {
   int exit_code = embody::kExitOk;
   CLI::App app("Controls embodyd, the daemon that lets a person drive a robot arm and hand with their own hand.");
@@ -39,6 +49,8 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    const std::string word = error.get_name() == "RequiredError" ? misplaced_word(app) : "";
+    if (!word.empty()) std::fprintf(stderr, "'%.60s' is not one of its subcommands\n", word.c_str());
     return app.exit(error) == 0 ? embody::kExitOk : embody::kExitUsage;
   }
   if (!app.get_subcommands().empty()) return exit_code;

@@ -78,7 +78,11 @@ int ask(const sim::LabRequest& request, const Options& options) {
   if (!client) return fail(client.error(), options.json);
   const auto response = client->request_line(sim::format_lab_request(request), kTimeout);
   if (!response) return fail(response.error(), options.json);
-  if (!response->ok) return fail(response->code, response->message, exit_code_of(response->code), options.json);
+  if (!response->ok) {
+    const bool unclear = request.command == LabCommand::kFault && response->code == control::code::kFailed;
+    return fail(response->code, response->message + (unclear ? "; 'embodyctl sim faults' lists what there is" : ""),
+                exit_code_of(response->code), options.json);
+  }
   print(request, response->result, options.json);
   return kExitOk;
 }

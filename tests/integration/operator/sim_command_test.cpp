@@ -105,7 +105,10 @@ TEST_F(SimCommand, ARefusedFaultIsTheSimulatorsSentenceAndAnExitCode) {
   EXPECT_EQ(sim({}).exit_code, kExitUsage);
   EXPECT_EQ(sim({"fault"}).exit_code, kExitUsage);
   EXPECT_EQ(sim({"fault", std::string(500, 'x')}).exit_code, kExitUsage);
-  EXPECT_EQ(sim({"nonsense"}).exit_code, kExitUsage);
+  EXPECT_NE(unknown.errors.find("embodyctl sim faults"), std::string::npos) << "it says where to look";
+  const Finished misspelt = sim({"fualt"});
+  EXPECT_EQ(misspelt.exit_code, kExitUsage);
+  EXPECT_NE(misspelt.errors.find("'fualt'"), std::string::npos) << misspelt.errors;
 }
 
 TEST_F(SimCommand, ListsFaultsShowsStatusAndReportAndStartsThePlayback) {
